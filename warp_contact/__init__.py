@@ -1,0 +1,32 @@
+"""Contact between deformable bodies by contact surfaces, on NVIDIA Warp."""
+
+from warp_contact.errors import SimulationError
+from warp_contact.materials import Corotated, NeoHookean, SpringNetwork
+from warp_contact.measure import Measure
+from warp_contact.mesh import MeshError, TetMesh
+from warp_contact.response import ContactSurface, Penalty
+from warp_contact.scene import Body, Scene
+from warp_contact.shapes import box, cylinder, dish, sphere
+from warp_contact.simulation import Simulation
+from warp_contact.usd import UsdWriter
+
+__all__ = [
+    "Body",
+    "ContactSurface",
+    "Corotated",
+    "Measure",
+    "MeshError",
+    "NeoHookean",
+    "Penalty",
+    "Scene",
+    "Simulation",
+    "SimulationError",
+    "SpringNetwork",
+    "TetMesh",
+    "UsdWriter",
+    "box",
+    "cylinder",
+    "dish",
+    "sphere",
+]
+__version__ = "0.1.0"

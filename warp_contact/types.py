@@ -122,3 +122,69 @@ class State:
 
     x: wp.array
     v: wp.array
+
+
+@dataclass
+class Contacts:
+    """What stage 1 and 2 find, rebuilt in every step. Vertex c's side moves along the normal.
+
+    A contact joins a vertex, or a point of an edge, to a point of a triangle, or of its edge, by
+    five vertices with signed weights: gap = (sum coef x) . normal - offset. The first
+    ``hit_start[n_vert]`` contacts are those of vertices. All capacities are fixed; what does not
+    fit is counted in ``needed`` and never written.
+
+    Attributes:
+        n: number of contacts, shape (1,)
+        needed: capacities that would have been enough, 0 where they were: contacts, slots of a
+            vertex, slots of an edge, near bodies, pairs; shape (5,)
+        vert: vertices, shape (capacity, 5)
+        coef: signed weights, shape (capacity, 5)
+        normal: unit direction, shape (capacity,)
+        depth: at detection [m], shape (capacity,)
+        offset: of a plane, else 0 [m], shape (capacity,)
+        pair: the two bodies, n_body + p for plane p, shape (capacity,)
+        start: first entry of each vertex in ``entry``, shape (n_vert + 1,)
+        entry: contacts at each vertex as 5 contact + k, shape (5 capacity,)
+        weight: sum of coef^2 N / m [1/kg], shape (capacity,)
+        lam: normal impulse of the step [N s], shape (capacity,)
+        slip: friction impulse of the step [N s], shape (capacity,)
+        change: impulse of the last sweep [N s], shape (capacity,)
+        left: overlap after the impulses [m], shape (capacity,)
+        share: part of it that the side along the normal takes, shape (capacity,)
+    """
+
+    n: wp.array
+    needed: wp.array
+    vert: wp.array
+    coef: wp.array
+    normal: wp.array
+    depth: wp.array
+    offset: wp.array
+    pair: wp.array
+    start: wp.array
+    entry: wp.array
+    weight: wp.array
+    lam: wp.array
+    slip: wp.array
+    change: wp.array
+    left: wp.array
+    share: wp.array
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """How much a step has room for.
+
+    Attributes:
+        contacts: contacts, and vertices inside other bodies
+        slots: bodies that one vertex is inside of
+        edge_slots: bodies that one edge crosses
+        near: bodies whose boxes meet that of one body
+        pairs: pairs of bodies with a contact force
+    """
+
+    contacts: int = 256
+    slots: int = 2
+    edge_slots: int = 2
+    near: int = 8
+    pairs: int = 64

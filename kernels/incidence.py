@@ -1,0 +1,83 @@
+"""The contacts at each vertex, as a list sorted by contact: sums over it repeat bit for bit.
+
+An entry is 5 c + k for vertex k of contact c. Entries of weight zero are left out.
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def total_contacts(
+    # in
+    hits: wp.array[int],  # (1,) vertices' contacts
+    crossings: wp.array[int],  # (1,) edges' contacts, behind them
+    capacity: int,
+    # out
+    n_contact: wp.array[int],  # (1,)
+    # out, added to
+    needed: wp.array[int],  # largest number seen, to grow the capacity
+):
+    """One thread: the number of contacts."""
+    n = hits[0] + crossings[0]
+    n_contact[0] = wp.min(n, capacity)
+    if n > capacity:
+        wp.atomic_max(needed, 0, n)
+
+
+@wp.kernel
+def count_entries(
+    # in
+    n_contact: wp.array[int],  # (1,)
+    vert: wp.array2d[int],  # (capacity, 5)
+    coef: wp.array2d[float],  # (capacity, 5)
+    # out, added to
+    count: wp.array[int],  # (n_vert + 1,)
+):
+    """One thread per contact."""
+    c = wp.tid()
+    if c >= n_contact[0]:
+        return
+    for k in range(5):
+        if coef[c, k] != 0.0:
+            wp.atomic_add(count, vert[c, k], 1)
+
+
+@wp.kernel
+def fill_entries(
+    # in
+    n_contact: wp.array[int],  # (1,)
+    vert: wp.array2d[int],  # (capacity, 5)
+    coef: wp.array2d[float],  # (capacity, 5)
+    # in, out
+    start: wp.array[int],  # (n_vert + 1,) ends of the lists in, their starts out
+    # out
+    entry: wp.array[int],  # (5 capacity,)
+):
+    """One thread per contact: write its entries, from the end of each list downwards."""
+    c = wp.tid()
+    if c >= n_contact[0]:
+        return
+    for k in range(5):
+        if coef[c, k] != 0.0:
+            entry[wp.atomic_sub(start, vert[c, k], 1) - 1] = 5 * c + k
+
+
+@wp.kernel
+def sort_entries(
+    # in
+    start: wp.array[int],  # (n_vert + 1,)
+    # in, out
+    entry: wp.array[int],  # (5 capacity,)
+):
+    """One thread per vertex: sort its list, which is short."""
+    i = wp.tid()
+    first = start[i]
+    for e in range(first + 1, start[i + 1]):
+        value = entry[e]
+        k = int(e)
+        while k > first and entry[wp.max(k - 1, 0)] > value:
+            entry[k] = entry[k - 1]
+            k -= 1
+        entry[k] = value

@@ -1,0 +1,102 @@
+"""Motion of the vertices: corner forces gathered, then symplectic Euler.
+
+    f_i = sum of f_tet over the corners at vertex i        [N]
+    v'  = v + h (f / m + g)                                [m/s]
+    x'  = x + h v'                                         [m]
+
+``vt_corner`` lists the corners at a vertex as 4 tet + corner. They are added in the order of
+that list and never by atomics, so runs repeat bit for bit.
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def corner_sum(
+    i: int, vt_start: wp.array[int], vt_corner: wp.array[int], f_tet: wp.array2d[wp.vec3]
+) -> wp.vec3:
+    f = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(vt_start[i], vt_start[i + 1]):
+        c = vt_corner[k]
+        f += f_tet[c >> 2, c & 3]
+    return f
+
+
+@wp.kernel
+def gather(
+    # in
+    vt_start: wp.array[int],  # (n_vert + 1,)
+    vt_corner: wp.array[int],  # (4 n_tet,)
+    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    # out
+    f: wp.array[wp.vec3],  # (n_vert,) [N]
+):
+    """One thread per vertex: sum the forces on its tet corners."""
+    i = wp.tid()
+    f[i] = corner_sum(i, vt_start, vt_corner, f_tet)
+
+
+@wp.kernel
+def predict(
+    # in
+    vt_start: wp.array[int],  # (n_vert + 1,)
+    vt_corner: wp.array[int],  # (4 n_tet,)
+    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
+    gravity: wp.vec3,  # [m/s^2]
+    dt: wp.array[float],  # (1,) [s]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    # out
+    x_new: wp.array[wp.vec3],  # (n_vert,) [m], may be x
+    v_new: wp.array[wp.vec3],  # (n_vert,) [m/s], may be v
+):
+    """One thread per vertex: kick by the forces and drift; fixed vertices keep their velocity."""
+    i = wp.tid()
+    h = dt[0]
+    u = v[i]
+    if inv_mass[i] > 0.0:
+        u += h * (inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet) + gravity)
+    v_new[i] = u
+    x_new[i] = x[i] + h * u
+
+
+@wp.kernel
+def advance(
+    # in
+    dt: wp.array[float],  # (1,) [s]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    # out
+    x_new: wp.array[wp.vec3],  # (n_vert,) [m], may be x
+):
+    """One thread per vertex: drift."""
+    i = wp.tid()
+    x_new[i] = x[i] + dt[0] * v[i]
+
+
+@wp.kernel
+def relax(
+    # in
+    vt_start: wp.array[int],  # (n_vert + 1,)
+    vt_corner: wp.array[int],  # (4 n_tet,)
+    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N], C Y_{j-1}
+    inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
+    dt: wp.array[float],  # (1,) [s]
+    j: int,
+    s: int,
+    last: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_{j-1}
+    before: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_{j-2}
+    # out
+    y: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_j; may be last or before
+):
+    """One thread per vertex: stage j of s of the damping."""
+    i = wp.tid()
+    u = last[i]
+    if inv_mass[i] > 0.0:
+        back = float(1 - j) / float(j)
+        kick = dt[0] * float(4 * j - 2) / float(j * s * (s + 1)) * inv_mass[i]
+        u += back * (before[i] - u) - kick * corner_sum(i, vt_start, vt_corner, f_tet)
+    y[i] = u

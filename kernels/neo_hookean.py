@@ -1,0 +1,140 @@
+"""Stable neo-Hookean elasticity without the logarithmic term, on linear tets.
+
+    psi = mu/2 (I_C - 3) - mu (J - 1) + l/2 (J - 1)^2      energy density            [Pa]
+    P   = mu F + (l (J - 1) - mu) cof F                    first Piola stress        [Pa]
+    dP  = mu dF + l (cof F : dF) cof F + (l (J - 1) - mu) dcof F
+    l   = lam + mu                                         so that small strains see (mu, lam)
+
+I_C = F : F, J = det F; mu, lam are the Lame parameters of small strain [Pa], beta the damping
+time [s] of the viscous stress in ``tet.viscous_stress``. P is a polynomial in F: it is finite
+and pushes back for flat and inverted tets. A row of ``param`` is (mu, lam, beta).
+
+Energies are written in the Green strain E = (F^T F - I)/2, because I_C - 3 cancels in float32:
+
+    psi = mu (tr E (J - 1) - 4 tr cof E - 8 det E)/(J + 1) + l/2 (J - 1)^2,  J > 0
+
+Source: Smith, de Goes, Kim 2018, "Stable neo-Hookean flesh simulation", eq. 9 and section 3.4.
+"""
+
+import warp as wp
+
+from warp_contact.kernels import tet as element
+
+wp.set_module_options({"enable_backward": False, "optimization_level": 3})
+
+
+@wp.func
+def stress(g: wp.mat33, mu: float, lam: float) -> wp.mat33:
+    """P at F = I + g, with no term that stays finite and cancels as g goes to 0."""
+    cof_g = element.cof(g)
+    j = element.dilation(g, cof_g)
+    difference = (
+        g + wp.transpose(g) - wp.trace(g) * wp.identity(n=3, dtype=float) - cof_g
+    )  # F - cof F
+    return mu * difference + (lam + mu) * j * element.cof_near_identity(g, cof_g)
+
+
+@wp.func
+def stress_differential(g: wp.mat33, df: wp.mat33, mu: float, lam: float) -> wp.mat33:
+    cof_g = element.cof(g)
+    j = element.dilation(g, cof_g)
+    cof_f = element.cof_near_identity(g, cof_g)
+    f = g + wp.identity(n=3, dtype=float)
+    l = lam + mu
+    return mu * df + l * wp.ddot(cof_f, df) * cof_f + (l * j - mu) * element.cof_differential(f, df)
+
+
+@wp.func
+def energy_density(g: wp.mat33, mu: float, lam: float) -> float:
+    j = element.dilation(g, element.cof(g))
+    e = 0.5 * (g + wp.transpose(g) + wp.transpose(g) * g)
+    i = wp.trace(e)
+    shear = i - j
+    if j > -0.5:  # for J near -1 the quotient is 0/0, and nothing cancels any more
+        shear = (i * j - 4.0 * wp.trace(element.cof(e)) - 8.0 * wp.determinant(e)) / (j + 2.0)
+    return mu * shear + 0.5 * (lam + mu) * j * j
+
+
+@wp.kernel
+def set_forces(
+    # in
+    tet: wp.array[int],  # (n,) tet ids
+    param: wp.array2d[float],  # (n, 3) mu [Pa], lam [Pa], beta [s]
+    mask: wp.array[int],  # (n_tet,) tets with 0 are skipped
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
+    volume: wp.array[float],  # (n_tet,) [m^3]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+):
+    """One thread per tet of the model: set its corner forces, minus the energy gradient."""
+    r = wp.tid()
+    q = tet[r]
+    if mask[q] == 0:
+        return
+    g = element.displacement_gradient(q, tets, pose, x)
+    element.store_stress(q, -volume[q] * stress(g, param[r, 0], param[r, 1]), pose, f_tet)
+
+
+@wp.kernel
+def apply_stiffness(
+    # in
+    tet: wp.array[int],  # (n,) tet ids
+    param: wp.array2d[float],  # (n, 3) mu [Pa], lam [Pa], beta [s]
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
+    volume: wp.array[float],  # (n_tet,) [m^3]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    dx: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+):
+    """One thread per tet of the model: set its corner entries of K(x) dx."""
+    r = wp.tid()
+    q = tet[r]
+    g = element.displacement_gradient(q, tets, pose, x)
+    df = element.rate(q, tets, pose, dx)
+    dp = stress_differential(g, df, param[r, 0], param[r, 1])
+    element.store_stress(q, volume[q] * dp, pose, f_tet)
+
+
+@wp.kernel
+def apply_damping(
+    # in
+    tet: wp.array[int],  # (n,) tet ids
+    param: wp.array2d[float],  # (n, 3) mu [Pa], lam [Pa], beta [s]
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
+    volume: wp.array[float],  # (n_tet,) [m^3]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    # out
+    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+):
+    """One thread per tet of the model: set its corner entries of C(x) v."""
+    r = wp.tid()
+    q = tet[r]
+    f = element.rate(q, tets, pose, x)
+    df = element.rate(q, tets, pose, v)
+    p = element.viscous_stress(f, df, param[r, 0], param[r, 1], param[r, 2])
+    element.store_stress(q, volume[q] * p, pose, f_tet)
+
+
+@wp.kernel
+def energies(
+    # in
+    tet: wp.array[int],  # (n,) tet ids
+    param: wp.array2d[float],  # (n, 3) mu [Pa], lam [Pa], beta [s]
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
+    volume: wp.array[float],  # (n_tet,) [m^3]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    energy: wp.array[float],  # (n_tet,) [J]
+):
+    """One thread per tet of the model: set its elastic energy."""
+    r = wp.tid()
+    q = tet[r]
+    g = element.displacement_gradient(q, tets, pose, x)
+    energy[q] = volume[q] * energy_density(g, param[r, 0], param[r, 1])

@@ -1,0 +1,220 @@
+"""Stage 2: consistent penetration depth and direction, and the contact triangle.
+
+Heidelberger et al. 2004. A hit is (vertex i, penetrated body N). Border hits have a tet edge to a
+vertex outside N; with x_k the crossing of such an edge with N's surface nearest the outer end,
+n_k the normal there and w_k = 1 / |x_k - p|^2,
+
+    d(p) = sum w_k (x_k - p) . n_k / sum w_k          depth [m]
+    r(p) = normalise(sum w_k n_k)                     direction, out of N
+
+The others take it over from processed neighbours p_j, layer by layer, with m_j = 1 / |p_j - p|^2:
+
+    d(p) = sum m_j ((p_j - p) . r_j + d_j) / sum m_j
+    r(p) = normalise(sum m_j r_j)
+
+All tet edges take part: with surface edges alone, a vertex inside a flat face has in-plane
+neighbours only. Terms with (x_k - p) . n_k <= 0 leave by a side that faces away and are dropped.
+The contact point is where the ray p + t r leaves N (Spillmann & Teschner 2005, section 3.2), and t
+replaces d. Where no direction is known, or the ray would leave much deeper than d tells, the
+closest point of N's surface serves instead.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.hashing import is_inside
+from warp_contact.kernels.surface_query import (
+    closest_hit,
+    first_hit,
+    hit_normal,
+    hit_point,
+    leaving_hit,
+)
+
+wp.set_module_options({"enable_backward": False})
+
+FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
+
+
+@wp.kernel
+def border_depth(
+    # in
+    n_body: int,
+    slots: int,  # of each vertex
+    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    vs_start: wp.array[int],  # (n_vert + 1,)
+    vs_tri: wp.array[int],  # (3 n_tri,)
+    vn_start: wp.array[int],  # (n_vert + 1,)
+    vn_vert: wp.array[int],
+    inside: wp.array[int],  # (n_vert * slots,)
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    hit_start: wp.array[int],  # (n_vert + 1,)
+    hit_vert: wp.array[int],  # (capacity,)
+    hit_body: wp.array[int],  # (capacity,)
+    # out
+    hit_depth: wp.array[float],  # (capacity,) [m]
+    hit_dir: wp.array[wp.vec3],  # (capacity,)
+    hit_layer: wp.array[int],  # (capacity,) 0 for a border hit, untouched otherwise
+    # out, added to
+    pending: wp.array[int],  # (1,) 1 when some hit has no depth yet
+):
+    """One thread per hit: depth and direction from the crossing tet edges."""
+    e = wp.tid()
+    if e >= wp.min(hit_start[hit_start.shape[0] - 1], hit_vert.shape[0]):
+        return
+    i = hit_vert[e]
+    body = hit_body[e]
+    if body >= n_body:
+        return
+    p = x[i]
+    weight = float(0.0)
+    depth = float(0.0)
+    r = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(vn_start[i], vn_start[i + 1]):
+        j = vn_vert[k]
+        if not is_inside(j, body, slots, inside):
+            u = p - x[j]
+            hit = first_hit(surface, body, tris, x, x[j], u, -1.0e-6, -1.0)
+            if hit.tri >= 0:
+                n = hit_normal(hit, tris, vs_start, vs_tri, x)
+                gap = hit_point(hit, tris, x) - p
+                d = wp.dot(gap, n)
+                if d > 0.0:
+                    w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-12 * wp.length_sq(u))
+                    weight += w
+                    depth += w * d
+                    r += w * n
+    if weight > 0.0 and wp.length_sq(r) > 1.0e-6 * weight * weight:
+        hit_depth[e] = depth / weight
+        hit_dir[e] = wp.normalize(r)
+        hit_layer[e] = 0
+    else:
+        pending[0] = 1
+
+
+@wp.kernel
+def begin_layer(
+    # in, out
+    layer: wp.array[int],  # (1,) the layer that is filled next
+    pending: wp.array[int],  # (1,)
+):
+    """One thread: count the layer; ``pending`` stays 0 unless the layer fills a hit."""
+    layer[0] = layer[0] + 1
+    pending[0] = 0
+
+
+@wp.kernel
+def propagate(
+    # in
+    n_body: int,
+    layer: wp.array[int],  # (1,)
+    vn_start: wp.array[int],  # (n_vert + 1,)
+    vn_vert: wp.array[int],
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    hit_start: wp.array[int],  # (n_vert + 1,)
+    hit_vert: wp.array[int],  # (capacity,)
+    hit_body: wp.array[int],  # (capacity,)
+    # in, out
+    hit_depth: wp.array[float],  # (capacity,) [m]
+    hit_dir: wp.array[wp.vec3],  # (capacity,)
+    hit_layer: wp.array[int],  # (capacity,)
+    pending: wp.array[int],  # (1,) 1 when this layer filled a hit
+):
+    """One thread per hit without depth: take it over from neighbours of earlier layers."""
+    e = wp.tid()
+    count = wp.min(hit_start[hit_start.shape[0] - 1], hit_vert.shape[0])
+    if e >= count or hit_layer[e] >= 0:
+        return
+    i = hit_vert[e]
+    weight = float(0.0)
+    depth = float(0.0)
+    r = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(vn_start[i], vn_start[i + 1]):
+        j = vn_vert[k]
+        for f in range(hit_start[j], wp.min(hit_start[j + 1], count)):
+            if hit_body[f] == hit_body[e] and hit_layer[f] >= 0 and hit_layer[f] < layer[0]:
+                gap = x[j] - x[i]
+                w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-20)
+                weight += w
+                depth += w * (wp.dot(gap, hit_dir[f]) + hit_depth[f])
+                r += w * hit_dir[f]
+    if weight > 0.0 and wp.length_sq(r) > 1.0e-6 * weight * weight:
+        hit_depth[e] = depth / weight
+        hit_dir[e] = wp.normalize(r)
+        hit_layer[e] = layer[0]
+        pending[0] = 1
+
+
+@wp.kernel
+def vertex_contacts(
+    # in
+    n_body: int,
+    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    body_edge: wp.array[float],  # (n_body,) [m]
+    vert_body: wp.array[int],  # (n_vert,)
+    on_surface: wp.array[int],  # (n_vert,)
+    plane_n: wp.array[wp.vec3],  # (n_plane,)
+    plane_h: wp.array[float],  # (n_plane,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    hit_start: wp.array[int],  # (n_vert + 1,)
+    hit_vert: wp.array[int],  # (capacity,)
+    hit_body: wp.array[int],  # (capacity,)
+    hit_layer: wp.array[int],  # (capacity,)
+    hit_depth: wp.array[float],  # (capacity,) [m]
+    hit_dir: wp.array[wp.vec3],  # (capacity,)
+    # out
+    vert: wp.array2d[int],  # (capacity, 5)
+    coef: wp.array2d[float],  # (capacity, 5), all 0 for a hit that makes no contact
+    normal: wp.array[wp.vec3],  # (capacity,)
+    depth: wp.array[float],  # (capacity,) [m]
+    offset: wp.array[float],  # (capacity,) [m] gap = (sum coef x) . normal - offset
+    pair: wp.array[wp.vec2i],  # (capacity,)
+):
+    """One thread per hit: contact c = hit e of a surface vertex with a triangle or a plane."""
+    e = wp.tid()
+    if e >= wp.min(hit_start[hit_start.shape[0] - 1], hit_vert.shape[0]):
+        return
+    i = hit_vert[e]
+    body = hit_body[e]
+    for k in range(5):
+        vert[e, k] = i
+        coef[e, k] = 0.0
+    depth[e] = 0.0
+    offset[e] = 0.0
+    normal[e] = wp.vec3(0.0, 0.0, 0.0)
+    pair[e] = wp.vec2i(vert_body[i], body)
+    if body >= n_body:
+        n = plane_n[body - n_body]
+        coef[e, 0] = 1.0
+        normal[e] = n
+        offset[e] = plane_h[body - n_body]
+        depth[e] = offset[e] - wp.dot(n, x[i])
+        return
+    if on_surface[i] == 0:
+        return
+    r = hit_dir[e]
+    known = hit_layer[e] >= 0
+    hit = closest_hit(surface, body, tris, x, x[i], 0.1 * body_edge[body]) if not known else (
+        leaving_hit(surface, body, tris, x, x[i], r)
+    )
+    if known and (hit.tri < 0 or hit.t > FAR * wp.max(hit_depth[e], 0.0) + 0.05 * body_edge[body]):
+        known = False
+        hit = closest_hit(surface, body, tris, x, x[i], 0.1 * body_edge[body])
+    if hit.tri < 0:
+        return
+    t = tris[hit.tri]
+    if not known:
+        gap = hit_point(hit, tris, x) - x[i]
+        r = wp.normalize(wp.cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]))
+        if wp.dot(gap, r) > 0.0:
+            r = wp.normalize(gap)
+    vert[e, 2] = t[0]
+    vert[e, 3] = t[1]
+    vert[e, 4] = t[2]
+    coef[e, 0] = 1.0
+    coef[e, 2] = -hit.w[0]
+    coef[e, 3] = -hit.w[1]
+    coef[e, 4] = -hit.w[2]
+    normal[e] = r
+    depth[e] = wp.max(hit.t, 0.0)

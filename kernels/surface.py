@@ -1,0 +1,267 @@
+"""Stage 4: the contact surface, where the pressures of the two sides balance.
+
+A displacement vertex moves to x = x0 + a s, a in [0, 1]. Its traction is measured against s on its
+own share of the surface, seen along s:
+
+    tau = -F(x) . s^ / (A / 3),   A = sum of max(0, -n_t . s^) area_t over its triangles     [Pa]
+
+(a nodal force carries a third of its triangles). The other side's traction is interpolated with
+the weights of eqs. (1) and (2): P_other = sum w_i tau_i / sum w_i over the vertices that touch
+this vertex's triangles, blended into sum b_j tau_j over its own contact triangle where there are
+few. Between x0 and the trial each side acts like a spring, k = (P - P0) / a, so that
+
+    balanced   a <- (P0_other - P0_own + k_other) / (k_own + k_other)
+
+solves P_own(a) = P_other(1 - a); both sides solve it and meet in the middle, a <- (a + 1 - b) / 2,
+so that no gap and no overlap comes from their disagreement.
+
+    literal    P_own = f / A, P_other = sum w_i f_i / (A sum w_i) with f = -F . s^ (eq. 2 as
+               printed: A is the same on both sides of the comparison and falls out of it), and
+               a <- a +- 2^-(k + 2), k = 0, 1, ...: bisection after the first half
+
+A side whose vertices are all fixed is rigid: the other side goes all the way.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.geometry import area_vector
+from warp_contact.kernels.motion import corner_sum
+
+wp.set_module_options({"enable_backward": False})
+
+FEW = wp.constant(0.05)  # weight of touching vertices that counts as much as the own triangle
+RIGID = wp.constant(-1.0)  # stands for the fraction of a rigid side
+
+
+@wp.kernel
+def begin_literal(
+    # in
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    area: wp.array[float],  # (n_vert,) 1: forces are compared
+    fraction: wp.array[float],  # (n_vert,) 1/2
+):
+    """One thread per vertex: compare nodal forces; start half way."""
+    i = wp.tid()
+    area[i] = 1.0
+    if wp.length_sq(s[i]) > 0.0:
+        fraction[i] = 0.5
+
+
+@wp.kernel
+def begin_balance(
+    # in
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    vs_start: wp.array[int],  # (n_vert + 1,)
+    vs_tri: wp.array[int],  # (3 n_tri,)
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    area: wp.array[float],  # (n_vert,) [m^2]
+    fraction: wp.array[float],  # (n_vert,) 1/2
+):
+    """One thread per vertex: its area of comparison; start half way."""
+    i = wp.tid()
+    if wp.length_sq(s[i]) == 0.0:
+        return
+    fraction[i] = 0.5
+    along = wp.normalize(s[i])
+    a = float(0.0)
+    for e in range(vs_start[i], vs_start[i + 1]):
+        t = tris[vs_tri[e]]
+        n = area_vector(x[t[0]], x[t[1]], x[t[2]])
+        a += wp.max(-wp.dot(n, along), 0.0) / 3.0
+    area[i] = a
+
+
+@wp.kernel
+def tractions(
+    # in
+    vt_start: wp.array[int],  # (n_vert + 1,)
+    vt_corner: wp.array[int],  # (4 n_tet,)
+    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    area: wp.array[float],  # (n_vert,) [m^2]
+    # out
+    traction: wp.array[float],  # (n_vert,) [Pa]
+):
+    """One thread per vertex of the region: the traction with which it resists s."""
+    i = wp.tid()
+    if wp.length_sq(s[i]) == 0.0:
+        return
+    f = corner_sum(i, vt_start, vt_corner, f_tet)
+    traction[i] = 0.0
+    if area[i] > 0.0:
+        traction[i] = -wp.dot(f, wp.normalize(s[i])) / area[i]
+
+
+@wp.kernel
+def side_means(
+    # in
+    n_contact: wp.array[int],  # (1,)
+    vert: wp.array2d[int],  # (capacity, 5)
+    coef: wp.array2d[float],  # (capacity, 5)
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    before: wp.array[float],  # (n_vert,) [Pa] traction at x0
+    now: wp.array[float],  # (n_vert,) [Pa] traction at the trial
+    fraction: wp.array[float],  # (n_vert,)
+    # out
+    upper: wp.array[wp.vec3],  # (capacity,) (before, now, fraction) of the side that moves along n
+    lower: wp.array[wp.vec3],  # (capacity,) the same of the other side
+):
+    """One thread per contact: interpolate both sides to the contact point."""
+    c = wp.tid()
+    if c >= n_contact[0]:
+        return
+    up = wp.vec3(0.0, 0.0, 0.0)
+    lo = wp.vec3(0.0, 0.0, 0.0)
+    up_weight = float(0.0)
+    lo_weight = float(0.0)
+    for k in range(5):
+        i = vert[c, k]
+        a = coef[c, k]
+        if a != 0.0 and wp.length_sq(s[i]) > 0.0:
+            value = wp.vec3(before[i], now[i], fraction[i])
+            if a > 0.0:
+                up += a * value
+                up_weight += a
+            else:
+                lo -= a * value
+                lo_weight -= a
+    upper[c] = up / up_weight if up_weight > 0.0 else wp.vec3(0.0, 0.0, RIGID)
+    lower[c] = lo / lo_weight if lo_weight > 0.0 else wp.vec3(0.0, 0.0, RIGID)
+
+
+@wp.func
+def opposite(
+    i: int,
+    start: wp.array[int],
+    entry: wp.array[int],
+    coef: wp.array2d[float],
+    left: wp.array[float],
+    upper: wp.array[wp.vec3],
+    lower: wp.array[wp.vec3],
+) -> wp.vec4:
+    """Mean (before, now, fraction) of what vertex i touches, and the touching weight sum w_i.
+
+    The fraction is RIGID when something it touches cannot move.
+    """
+    touch = wp.vec3(0.0, 0.0, 0.0)
+    touch_weight = float(0.0)
+    own = wp.vec3(0.0, 0.0, 0.0)
+    own_weight = float(0.0)
+    rigid = bool(False)
+    for e in range(start[i], start[i + 1]):
+        c = entry[e] // 5
+        a = coef[c, entry[e] - 5 * c]
+        if left[c] > 0.0:
+            if a > 0.0:
+                own += a * lower[c]
+                own_weight += a
+                rigid = rigid or lower[c][2] == RIGID
+            else:
+                touch -= a * upper[c]
+                touch_weight -= a
+                rigid = rigid or upper[c][2] == RIGID
+    mean = wp.vec3(0.0, 0.0, 0.0)
+    if touch_weight > 0.0:
+        mean = touch / touch_weight
+    if own_weight > 0.0:
+        share = touch_weight / (touch_weight + FEW)
+        mean = share * mean + (1.0 - share) * own / own_weight
+    if rigid:
+        mean[2] = RIGID
+    return wp.vec4(mean[0], mean[1], mean[2], touch_weight)
+
+
+@wp.kernel
+def solve_balance(
+    # in
+    start: wp.array[int],  # (n_vert + 1,)
+    entry: wp.array[int],  # (5 capacity,)
+    coef: wp.array2d[float],  # (capacity, 5)
+    left: wp.array[float],  # (capacity,) [m]
+    upper: wp.array[wp.vec3],  # (capacity,)
+    lower: wp.array[wp.vec3],  # (capacity,)
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    before: wp.array[float],  # (n_vert,) [Pa]
+    now: wp.array[float],  # (n_vert,) [Pa]
+    # in, out
+    fraction: wp.array[float],  # (n_vert,)
+):
+    """One thread per vertex of the region: its own solution of P_own(a) = P_other(1 - a)."""
+    i = wp.tid()
+    if wp.length_sq(s[i]) == 0.0:
+        return
+    other = opposite(i, start, entry, coef, left, upper, lower)
+    if other[2] == RIGID:
+        fraction[i] = 1.0
+        return
+    k_own = wp.max(now[i] - before[i], 0.0) / wp.max(fraction[i], 1.0e-3)
+    k_other = wp.max(other[1] - other[0], 0.0) / wp.max(other[2], 1.0e-3)
+    if k_own + k_other > 0.0:
+        a = (other[0] - before[i] + k_other) / (k_own + k_other)
+        fraction[i] = wp.clamp(a, 0.0, 1.0)
+
+
+@wp.kernel
+def meet(
+    # in
+    start: wp.array[int],  # (n_vert + 1,)
+    entry: wp.array[int],  # (5 capacity,)
+    coef: wp.array2d[float],  # (capacity, 5)
+    left: wp.array[float],  # (capacity,) [m]
+    upper: wp.array[wp.vec3],  # (capacity,) of the solutions
+    lower: wp.array[wp.vec3],  # (capacity,)
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    # in, out
+    fraction: wp.array[float],  # (n_vert,)
+):
+    """One thread per vertex of the region: half way to what the other side leaves it."""
+    i = wp.tid()
+    if wp.length_sq(s[i]) == 0.0:
+        return
+    other = opposite(i, start, entry, coef, left, upper, lower)
+    if other[2] != RIGID:
+        fraction[i] = 0.5 * (fraction[i] + 1.0 - other[2])
+
+
+@wp.kernel
+def bisect(
+    # in
+    step: float,  # 2^-(k + 2)
+    start: wp.array[int],  # (n_vert + 1,)
+    entry: wp.array[int],  # (5 capacity,)
+    coef: wp.array2d[float],  # (capacity, 5)
+    left: wp.array[float],  # (capacity,) [m]
+    upper: wp.array[wp.vec3],  # (capacity,)
+    lower: wp.array[wp.vec3],  # (capacity,)
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    force: wp.array[float],  # (n_vert,) [N] with which the vertex resists s
+    # in, out
+    fraction: wp.array[float],  # (n_vert,)
+):
+    """One thread per vertex of the region: one step of the printed search, eq. (2)."""
+    i = wp.tid()
+    if wp.length_sq(s[i]) == 0.0:
+        return
+    other = opposite(i, start, entry, coef, left, upper, lower)
+    if other[2] == RIGID or wp.max(other[1], 0.0) > wp.max(force[i], 0.0):
+        fraction[i] = fraction[i] + step
+    else:
+        fraction[i] = fraction[i] - step
+
+
+@wp.kernel
+def displace(
+    # in
+    x0: wp.array[wp.vec3],  # (n_vert,) [m]
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    fraction: wp.array[float],  # (n_vert,)
+    # out
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+):
+    """One thread per vertex of the region: x = x0 + a s."""
+    i = wp.tid()
+    if wp.length_sq(s[i]) > 0.0:
+        x[i] = x0[i] + fraction[i] * s[i]

@@ -1,0 +1,173 @@
+"""Questions to the surface of one body, answered through the grouped triangle Bvh.
+
+    first_hit      the first crossing of a segment that enters (or leaves) the body
+    leaving_hit    where a ray from inside leaves the body
+    closest_hit    the closest point of the surface
+    hit_normal     the outward normal at a hit: of the face, blended over smooth edges only
+
+A hit is (triangle, distance along the query, weights of b and c); triangle -1 means none.
+Normals blended over the rim of a box push sideways and inject energy, so a neighbouring triangle
+joins the blend only when it is within the crease angle.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.geometry import NONE, area_vector, segment_hit, triangle_closest
+
+wp.set_module_options({"enable_backward": False})
+
+CREASE = wp.constant(0.6)  # cosine: edges sharper than 53 degrees keep their face normals
+
+
+@wp.struct
+class Hit:
+    tri: int  # -1: no hit
+    t: float  # along the segment [-] or the distance [m]
+    w: wp.vec3  # barycentric weights
+
+
+@wp.func
+def weights3(h: wp.vec3) -> wp.vec3:
+    """Barycentric weights of a segment hit, clamped into the triangle."""
+    v = wp.clamp(h[1], 0.0, 1.0)
+    w = wp.clamp(h[2], 0.0, 1.0 - v)
+    return wp.vec3(1.0 - v - w, v, w)
+
+
+@wp.func
+def first_hit(
+    surface: wp.uint64,
+    body: int,
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+    u: wp.vec3,
+    after: float,  # only hits with t > after
+    side: float,  # -1: entering (against the normal), +1: leaving
+) -> Hit:
+    """First crossing of p + t u, after < t <= 1, with the body's surface on the given side."""
+    best = Hit()
+    best.tri = -1
+    best.t = NONE
+    k = int(0)
+    q = p + u
+    root = wp.bvh_get_group_root(surface, body)
+    query = wp.bvh_query_aabb(surface, wp.min(p, q), wp.max(p, q), root)
+    while wp.bvh_query_next(query, k):
+        a = x[tris[k][0]]
+        b = x[tris[k][1]]
+        c = x[tris[k][2]]
+        if side * wp.dot(u, wp.cross(b - a, c - a)) > 0.0:
+            h = segment_hit(p, u, a, b, c)
+            if h[0] > after and h[0] <= 1.0:
+                if h[0] < best.t or (h[0] == best.t and k < best.tri):
+                    best.tri = k
+                    best.t = h[0]
+                    best.w = weights3(h)
+    return best
+
+
+@wp.func
+def leaving_hit(
+    surface: wp.uint64,
+    body: int,
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+    r: wp.vec3,  # unit
+) -> Hit:
+    """Where the ray p + t r, t >= 0, first leaves the body."""
+    best = Hit()
+    best.tri = -1
+    best.t = NONE
+    k = int(0)
+    query = wp.bvh_query_ray(surface, p, r, wp.bvh_get_group_root(surface, body))
+    while wp.bvh_query_next(query, k, best.t):
+        a = x[tris[k][0]]
+        b = x[tris[k][1]]
+        c = x[tris[k][2]]
+        if wp.dot(r, wp.cross(b - a, c - a)) > 0.0:
+            h = segment_hit(p, r, a, b, c)
+            if h[0] >= 0.0 and (h[0] < best.t or (h[0] == best.t and k < best.tri)):
+                best.tri = k
+                best.t = h[0]
+                best.w = weights3(h)
+    return best
+
+
+@wp.func
+def closest_hit(
+    surface: wp.uint64,
+    body: int,
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+    reach: float,  # where the search starts; doubled until it suffices [m]
+) -> Hit:
+    """Closest point of the body's surface; none only if it is a million reaches away."""
+    best = Hit()
+    best.tri = -1
+    best.t = NONE
+    k = int(0)
+    root = wp.bvh_get_group_root(surface, body)
+    radius = float(reach)
+    for _attempt in range(20):
+        grow = wp.vec3(radius, radius, radius)
+        query = wp.bvh_query_aabb(surface, p - grow, p + grow, root)
+        while wp.bvh_query_next(query, k):
+            a = x[tris[k][0]]
+            b = x[tris[k][1]]
+            c = x[tris[k][2]]
+            w = triangle_closest(p, a, b, c)
+            d = wp.length(w[0] * (a - p) + w[1] * (b - p) + w[2] * (c - p))
+            if d < best.t or (d == best.t and k < best.tri):
+                best.tri = k
+                best.t = d
+                best.w = w
+        if best.t <= radius:
+            return best
+        radius = 2.0 * radius
+    return best
+
+
+@wp.func
+def corner_normal(
+    i: int,
+    face: wp.vec3,  # area vector of the triangle that asks [m^2]
+    tris: wp.array[wp.vec3i],
+    vs_start: wp.array[int],
+    vs_tri: wp.array[int],
+    x: wp.array[wp.vec3],
+) -> wp.vec3:
+    """Unit normal at vertex i over the triangles within the crease angle of the face."""
+    n = wp.vec3(0.0, 0.0, 0.0)
+    f = wp.normalize(face)
+    for e in range(vs_start[i], vs_start[i + 1]):
+        t = tris[vs_tri[e]]
+        s = area_vector(x[t[0]], x[t[1]], x[t[2]])
+        if wp.dot(s, f) > CREASE * wp.length(s):
+            n += s
+    return wp.normalize(n)
+
+
+@wp.func
+def hit_normal(
+    hit: Hit,
+    tris: wp.array[wp.vec3i],
+    vs_start: wp.array[int],
+    vs_tri: wp.array[int],
+    x: wp.array[wp.vec3],
+) -> wp.vec3:
+    """Outward unit normal at a hit."""
+    t = tris[hit.tri]
+    face = area_vector(x[t[0]], x[t[1]], x[t[2]])
+    n = hit.w[0] * corner_normal(t[0], face, tris, vs_start, vs_tri, x)
+    n += hit.w[1] * corner_normal(t[1], face, tris, vs_start, vs_tri, x)
+    n += hit.w[2] * corner_normal(t[2], face, tris, vs_start, vs_tri, x)
+    return wp.normalize(n)
+
+
+@wp.func
+def hit_point(hit: Hit, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3]) -> wp.vec3:
+    t = tris[hit.tri]
+    return hit.w[0] * x[t[0]] + hit.w[1] * x[t[1]] + hit.w[2] * x[t[2]]

@@ -1,0 +1,129 @@
+"""What all tests share: every device, a fresh seed, boxes of tets, models without a scene."""
+
+import os
+from itertools import permutations
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import warp as wp
+
+
+@pytest.fixture(autouse=True, params=wp.get_devices(), ids=str)
+def device(request):
+    """Every test runs on every device."""
+    with wp.ScopedDevice(request.param):
+        yield request.param
+
+
+@pytest.fixture
+def rng():
+    """Fresh numbers in every run; a failure prints the seed, SEED=... repeats it."""
+    seed = int(os.environ.get("SEED", np.random.SeedSequence().entropy % 2**32))
+    print(f"SEED={seed}")
+    return np.random.default_rng(seed)
+
+
+def _box(cells: tuple[int, int, int], size: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    m = np.array(cells) + 1
+    x = np.stack(np.meshgrid(*map(np.arange, m), indexing="ij"), axis=-1).reshape(-1, 3)
+    stride = np.array([m[1] * m[2], m[2], 1])
+    first = x[(x < cells).all(axis=1)]
+    tets = []
+    for path in permutations(range(3)):
+        corner = [first]
+        for axis in path:
+            corner.append(corner[-1] + np.eye(3, dtype=int)[axis])
+        ids = np.stack(corner, axis=1) @ stride
+        odd = np.linalg.det(np.eye(3)[list(path)]) < 0.0
+        tets.append(ids[:, [0, 2, 1, 3]] if odd else ids)
+    return size * x.astype(float), np.stack(tets, axis=1).reshape(-1, 4)
+
+
+@pytest.fixture
+def box():
+    """Vertices [m] and tets of ``box((nx, ny, nz), size of a cell)``, six tets a cell."""
+    return _box
+
+
+def _model(*bodies, fixed=(), gravity=(0.0, 0.0, 0.0)) -> SimpleNamespace:
+    counts = np.cumsum([0] + [len(x) for x, _, _ in bodies])
+    x = np.concatenate([b[0] for b in bodies])
+    tets = np.concatenate([b[1] + i for b, i in zip(bodies, counts, strict=False)])
+    edges = np.swapaxes(x[tets[:, 1:]] - x[tets[:, :1]], 1, 2)
+    volume = np.linalg.det(edges) / 6.0
+    density = np.concatenate([np.full(len(t), material.density) for _, t, material in bodies])
+    mass = np.bincount(tets.ravel(), np.repeat(density * volume / 4.0, 4))
+    inv_mass = 1.0 / mass
+    inv_mass[list(fixed)] = 0.0
+    start = np.concatenate([[0], np.cumsum(np.bincount(tets.ravel()))])
+    elements, first = [], 0
+    for vertices, t, material in bodies:
+        elements.append(
+            SimpleNamespace(
+                kernels=material.kernels,
+                tet=wp.array(np.arange(first, first + len(t)), dtype=int),
+                param=wp.array(material.parameters(vertices, t), dtype=float),
+                damped=material.damping > 0.0,
+            )
+        )
+        first += len(t)
+    return SimpleNamespace(
+        elements=tuple(elements),
+        gravity=gravity,
+        n_body=len(bodies),
+        n_vert=len(x),
+        n_tet=len(tets),
+        body_vert=wp.array(counts, dtype=int),
+        vert_body=wp.array(np.repeat(np.arange(len(bodies)), np.diff(counts)), dtype=int),
+        mass=wp.array(mass, dtype=float),
+        inv_mass=wp.array(inv_mass, dtype=float),
+        tets=wp.array(tets, dtype=wp.vec4i),
+        pose=wp.array(np.linalg.inv(edges), dtype=wp.mat33),
+        volume=wp.array(volume, dtype=float),
+        vt_start=wp.array(start, dtype=int),
+        vt_corner=wp.array(np.argsort(tets.ravel(), kind="stable"), dtype=int),
+    )
+
+
+@pytest.fixture
+def build_model():
+    """The elastic part of a Model from bodies (rest vertices [m], tets, material)."""
+    return _model
+
+
+def _at_vertices(launch, model, *fields) -> np.ndarray:
+    f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+    launch(model, *[wp.array(u, dtype=wp.vec3) for u in fields], f_tet)
+    f = np.zeros((model.n_vert, 3))
+    np.add.at(f, model.tets.numpy().ravel(), f_tet.numpy().reshape(-1, 3).astype(float))
+    return f
+
+
+@pytest.fixture
+def at_vertices():
+    """Sum over the corners of a stage: ``at_vertices(forces.apply_stiffness, model, x, dx)``."""
+    return _at_vertices
+
+
+@pytest.fixture
+def forces_of():
+    """Vertex forces [N] of ``forces_of(model, x)``."""
+    from warp_contact import forces
+
+    def launch(model, x, f_tet):
+        mask = wp.full(model.n_tet, 1, dtype=int)
+        forces.internal_forces(model, x, mask, f_tet)
+
+    return lambda model, x: _at_vertices(launch, model, x)
+
+
+@pytest.fixture
+def dense():
+    """Matrix of ``dense(stage, model, x)``, shape (3 n_vert, 3 n_vert)."""
+
+    def matrix(launch, model, x):
+        unit = np.eye(3 * model.n_vert).reshape(-1, model.n_vert, 3)
+        return np.stack([_at_vertices(launch, model, x, u).ravel() for u in unit], axis=1)
+
+    return matrix

@@ -1,0 +1,223 @@
+"""Damping: its matrix, and forces.damp as a step of its own."""
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.polynomial.legendre import Legendre
+
+from warp_contact import forces
+from warp_contact.kernels import motion
+from warp_contact.materials import Corotated, NeoHookean, SpringNetwork
+from warp_contact.spectrum import Spectrum
+
+BETA = 1e-2  # [s]
+EPS = 1.2e-7  # float32
+MATERIALS = [
+    NeoHookean(1e5, 0.3, 1000.0, BETA),
+    NeoHookean(1e5, -0.6, 1000.0, BETA),
+    Corotated(1e5, 0.3, 1000.0, BETA),
+    SpringNetwork(3e3, 2e3, 1e3, 1000.0, BETA),
+]
+materials = pytest.mark.parametrize("material", MATERIALS)
+
+
+@pytest.fixture
+def body(box, rng):
+    x, tets = box((2, 1, 1))
+    return x + 0.1 * rng.uniform(-1.0, 1.0, x.shape), tets
+
+
+def deformed(x: np.ndarray, rng) -> np.ndarray:
+    return x * [0.8, 1.3, 1.0] + 0.1 * rng.uniform(-1.0, 1.0, x.shape)
+
+
+def damp(model, x, v, dt: float, stages: int) -> np.ndarray:
+    v = wp.array(v, dtype=wp.vec3)
+    f_tet = wp.full((model.n_tet, 4), wp.vec3(np.nan))  # scratch: whatever it holds
+    w = wp.full(model.n_vert, wp.vec3(np.nan))
+    x = wp.array(x, dtype=wp.vec3)
+    forces.damp(model, x, v, wp.full(1, dt, dtype=float), f_tet, w, stages)
+    return v.numpy().astype(float)
+
+
+def fastest(dense, model, x) -> tuple[float, np.ndarray]:
+    """Largest eigenvalue [1/s] of M^-1 C and its eigenvector, from the full matrix."""
+    root = np.sqrt(np.repeat(model.inv_mass.numpy().astype(float), 3))
+    c = dense(forces.apply_damping, model, x)
+    value, vector = np.linalg.eigh(root[:, None] * (c + c.T) / 2.0 * root)
+    return value[-1], (root * vector[:, -1]).reshape(-1, 3)
+
+
+@materials
+def test_damping_is_symmetric_and_takes_energy(material, body, rng, build_model, dense):
+    model = build_model((*body, material))
+    c = dense(forces.apply_damping, model, deformed(body[0], rng))
+    size = np.abs(c).max()
+    # Entries are sums of about ten products, each rounded.
+    np.testing.assert_allclose(c, c.T, atol=20.0 * EPS * size)
+    assert np.linalg.eigvalsh(c)[0] > -100.0 * EPS * size
+
+
+@materials
+def test_rigid_motion_is_not_damped(material, body, rng, build_model, at_vertices):
+    x = deformed(body[0], rng)
+    model = build_model((*body, material))
+    spin, drift = rng.standard_normal((2, 3))
+    shear = at_vertices(forces.apply_damping, model, x, x[:, [1, 2, 0]])
+    rigid = at_vertices(forces.apply_damping, model, x, drift + np.cross(spin, x))
+    # The rates that cancel are as large as those of the shear, each rounded a few times.
+    assert np.abs(rigid).max() < 100.0 * EPS * np.abs(shear).max()
+
+
+@materials
+def test_damping_is_beta_times_the_stiffness_at_rest(material, body, build_model, dense):
+    model = build_model((*body, material))
+    c = dense(forces.apply_damping, model, body[0])
+    k = dense(forces.apply_stiffness, model, body[0])
+    # Rest is met to float32 only: the stress of one EPS of strain stays in K.
+    np.testing.assert_allclose(c, BETA * k, atol=100.0 * EPS * np.abs(c).max())
+
+
+@materials
+@pytest.mark.parametrize("stages", [1, 2, 3, 4, 7])
+def test_a_mode_shrinks_by_the_stability_polynomial(
+    material, stages, body, rng, build_model, dense
+):
+    x = deformed(body[0], rng).astype(np.float32)
+    model = build_model((*body, material))
+    rate, mode = fastest(dense, model, x)
+    dt = 0.7 * (stages**2 + stages) / rate
+    factor = Legendre.basis(stages)(1.0 - 2.0 * 0.7)
+    # Every stage rounds v a few times.
+    atol = 100.0 * EPS * np.abs(mode).max()
+    np.testing.assert_allclose(damp(model, x, mode, dt, stages), factor * mode, atol=atol)
+
+
+@materials
+def test_damp_keeps_momentum_and_never_adds_energy(material, body, rng, build_model, dense):
+    x = deformed(body[0], rng)
+    model = build_model((*body, material))
+    rate, _ = fastest(dense, model, x)
+    mass = model.mass.numpy()[:, None].astype(float)
+    v = rng.standard_normal(x.shape)
+    for stages in (1, 2, 5, 12):
+        for part in (0.01, 0.5, 1.0):
+            new = damp(model, x, v, part * (stages**2 + stages) / rate, stages)
+            scale = np.abs(mass * v).sum()
+            # Opposite impulses up to (stages^2 + stages) v, each rounded.
+            tolerance = 10.0 * EPS * (stages**2 + stages)
+            assert np.abs((mass * (new - v)).sum(axis=0)).max() < tolerance * scale
+            spin = np.cross(x, mass * (new - v)).sum(axis=0)
+            assert np.abs(spin).max() < 10.0 * tolerance * scale
+            assert (mass * new**2).sum() <= (mass * v**2).sum() * (1.0 + tolerance)
+
+
+def test_fixed_vertices_keep_their_velocity(body, rng, build_model):
+    fixed = [0, 3, 5]
+    model = build_model((*body, MATERIALS[0]), fixed=fixed)
+    v = rng.standard_normal(body[0].shape).astype(np.float32)
+    for stages in (1, 2, 3, 4):
+        new = damp(model, body[0], v, 1e-4, stages)
+        np.testing.assert_array_equal(new[fixed], v[fixed])
+        assert (new[1] != v[1]).any()
+
+
+def test_undamped_bodies_are_left_alone(body, rng, build_model):
+    free = NeoHookean(1e5, 0.3, 1000.0)
+    x = np.concatenate([body[0], body[0]])
+    v = rng.standard_normal(x.shape).astype(np.float32)
+    n = len(body[0])
+    mixed = build_model((*body, free), (*body, MATERIALS[2]))
+    new = damp(mixed, x, v, 1e-4, 3)
+    np.testing.assert_array_equal(new[:n], v[:n])
+    assert (new[n:] != v[n:]).any()
+
+
+def test_without_damping_nothing_is_launched(body, build_model, monkeypatch):
+    model = build_model((*body, NeoHookean(1e5, 0.3, 1000.0)))
+    monkeypatch.setattr(wp, "launch", None)
+    damp_scratch = [wp.zeros(1), wp.zeros(1), wp.zeros(1)]
+    forces.damp(model, wp.zeros(1), *damp_scratch, wp.zeros(1), 5)
+
+
+def test_damp_replays_from_a_graph(body, rng, build_model):
+    model = build_model((*body, MATERIALS[0]))
+    start = rng.standard_normal(body[0].shape)
+    expected = damp(model, body[0], start, 1e-4, 3)
+    x, v = wp.array(body[0], dtype=wp.vec3), wp.array(start, dtype=wp.vec3)
+    f_tet, w = wp.zeros((model.n_tet, 4), dtype=wp.vec3), wp.zeros_like(v)
+    dt = wp.full(1, 1.0, dtype=float)
+    with wp.ScopedCapture() as capture:
+        forces.damp(model, x, v, dt, f_tet, w, 3)
+    dt.fill_(1e-4)
+    v.assign(start.astype(np.float32))
+    wp.capture_launch(capture.graph)
+    np.testing.assert_array_equal(v.numpy(), expected)
+
+
+def test_enough_stages_are_taken():
+    for z in (0.0, 1e-3, 1.0, 10.0, 1e3):
+        s = forces.stages_for(z / 1e-3, 1e-3)
+        assert z * forces.MARGIN <= s * (s + 1)
+        assert s == 0 or z * forces.MARGIN > s * (s - 1)
+
+
+@pytest.mark.parametrize("material", [NeoHookean, Corotated])
+@pytest.mark.parametrize("ratio", [0.02, 0.1])
+def test_first_mode_of_a_bar_decays_by_beta_omega_squared(
+    material, ratio, box, build_model, dense
+):
+    x, tets = box((8, 2, 2), 0.05)
+    fixed = np.flatnonzero(x[:, 0] == 0.0)
+    rest = build_model((x, tets, material(1e6, 0.3, 1000.0)), fixed=fixed)
+    root = np.sqrt(np.repeat(rest.inv_mass.numpy().astype(float), 3))
+    k = dense(forces.apply_stiffness, rest, x)
+    value, vector = np.linalg.eigh(root[:, None] * (k + k.T) / 2.0 * root)
+    first = 3 * len(fixed)  # after the zeros of the fixed vertices
+    omega, mode = np.sqrt(value[first]), (root * vector[:, first]).reshape(-1, 3)
+    beta = 2.0 * ratio / omega
+
+    model = build_model((x, tets, material(1e6, 0.3, 1000.0, beta)), fixed=fixed)
+    state = wp.array(x + 1e-3 * mode / np.abs(mode).max(), dtype=wp.vec3)
+    rest_x = state.numpy() - x
+    spectrum = Spectrum(model)
+    h = 0.8 * 2.0 / spectrum.omega(state)
+    stages = forces.stages_for(spectrum.damping_rate(state), h)
+    assert h * spectrum.damping_rate(state) > 3.0  # explicit damping would need a smaller step
+    weight = model.mass.numpy()[:, None] * mode
+    steps = int(3.0 * 2.0 * np.pi / omega / h)
+    q, p = modal_motion(model, state, x, weight, h, stages, steps)
+    # The envelope of q, from the energy of the mode over whole periods.
+    envelope = np.log(np.hypot(q * omega, p + ratio * omega * q))
+    rate = -np.polyfit(h * np.arange(steps), envelope, 1)[0]
+    assert np.abs(rest_x).max() < 2e-3
+    # First order in h of the splitting: about h omega = 1 %.  Float32 and the amplitude of 1e-3
+    # of an edge of 0.05 add as much.
+    assert rate == pytest.approx(ratio * omega, rel=0.05)
+
+
+def modal_motion(model, x, rest, weight, h: float, stages: int, steps: int):
+    """Amplitude and velocity of a mode over ``steps`` steps of symplectic Euler and damping."""
+    v = wp.zeros_like(x)
+    w = wp.zeros_like(x)
+    f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+    mask = wp.full(model.n_tet, 1, dtype=int)
+    dt = wp.full(1, h, dtype=float)
+    trash = wp.zeros_like(x)
+    with wp.ScopedCapture() as capture:
+        forces.internal_forces(model, x, mask, f_tet)
+        csr = [model.vt_start, model.vt_corner, f_tet, model.inv_mass]
+        wp.launch(
+            motion.predict,
+            dim=model.n_vert,
+            inputs=[*csr, wp.vec3(*model.gravity), dt, x, v],
+            outputs=[trash, v],
+        )
+        forces.damp(model, x, v, dt, f_tet, w, stages)
+        wp.launch(motion.advance, dim=model.n_vert, inputs=[dt, x, v], outputs=[x])
+    q, p = np.empty(steps), np.empty(steps)
+    for k in range(steps):
+        q[k] = (weight * (x.numpy() - rest)).sum()
+        p[k] = (weight * v.numpy()).sum()
+        wp.capture_launch(capture.graph)
+    return q, p

@@ -1,0 +1,7 @@
+"""``python -m warp_contact``: the command line."""
+
+import sys
+
+from warp_contact.cli import main
+
+sys.exit(main())

@@ -1,0 +1,87 @@
+"""Stage 2: depth, direction and contact triangle of every hit and crossing."""
+
+import warp as wp
+
+from warp_contact.kernels import crossing, incidence, penetration
+from warp_contact.types import Model
+from warp_contact.work import Work
+
+
+def hit_depths(model: Model, x: wp.array, work: Work) -> None:
+    """Set ``hit_depth``, ``hit_dir`` and ``hit_layer``: the border, then layer by layer."""
+    work.layer.zero_()
+    work.pending.zero_()
+    hits = [work.hit_start, work.hit_vert, work.hit_body]
+    wp.launch(
+        penetration.border_depth,
+        dim=work.capacity.contacts,
+        inputs=[model.n_body, work.capacity.slots, work.surface.id, model.tris]
+        + [model.vs_start, model.vs_tri, model.vn_start, model.vn_vert, work.inside, x, *hits],
+        outputs=[work.hit_depth, work.hit_dir, work.hit_layer, work.pending],
+    )
+
+    def fill_layer() -> None:
+        wp.launch(penetration.begin_layer, dim=1, inputs=[], outputs=[work.layer, work.pending])
+        wp.launch(
+            penetration.propagate,
+            dim=work.capacity.contacts,
+            inputs=[model.n_body, work.layer, model.vn_start, model.vn_vert, x, *hits],
+            outputs=[work.hit_depth, work.hit_dir, work.hit_layer, work.pending],
+        )
+
+    wp.capture_while(work.pending, fill_layer)
+
+
+def vertex_contacts(model: Model, x: wp.array, work: Work) -> None:
+    """Set the contact records of the hits."""
+    wp.launch(
+        penetration.vertex_contacts,
+        dim=work.capacity.contacts,
+        inputs=[model.n_body, work.surface.id, model.tris, model.body_edge, model.vert_body]
+        + [model.on_surface, model.plane_n, model.plane_h, x, work.hit_start, work.hit_vert]
+        + [work.hit_body, work.hit_layer, work.hit_depth, work.hit_dir],
+        outputs=_records(work),
+    )
+    _count(work, work.none)
+
+
+def edge_contacts(model: Model, x: wp.array, work: Work) -> None:
+    """Append the contact records of the crossings."""
+    wp.launch(
+        crossing.edge_contacts,
+        dim=model.n_edge,
+        inputs=[work.surface.id, model.tris, model.edges, model.vert_body, model.body_edge]
+        + [work.hit_start, work.edge_start, work.edge_body, x],
+        outputs=_records(work),
+    )
+    _count(work, work.n_crossing)
+
+
+def contacts_by_vertex(model: Model, work: Work) -> None:
+    """Set ``contacts.start`` and ``contacts.entry``."""
+    c = work.contacts
+    m = work.capacity.contacts
+    c.start.zero_()
+    wp.launch(incidence.count_entries, dim=m, inputs=[c.n, c.vert, c.coef], outputs=[c.start])
+    wp.utils.array_scan(c.start, c.start, inclusive=True)
+    wp.launch(
+        incidence.fill_entries,
+        dim=m,
+        inputs=[c.n, c.vert, c.coef],
+        outputs=[c.start, c.entry],
+    )
+    wp.launch(incidence.sort_entries, dim=model.n_vert, inputs=[c.start], outputs=[c.entry])
+
+
+def _records(work: Work) -> list[wp.array]:
+    c = work.contacts
+    return [c.vert, c.coef, c.normal, c.depth, c.offset, c.pair]
+
+
+def _count(work: Work, crossings: wp.array) -> None:
+    wp.launch(
+        incidence.total_contacts,
+        dim=1,
+        inputs=[work.n_hit, crossings, work.capacity.contacts],
+        outputs=[work.contacts.n, work.contacts.needed[0:1]],
+    )

@@ -1,0 +1,99 @@
+"""Elastic and damping forces of all bodies."""
+
+import math
+
+import warp as wp
+
+from warp_contact.kernels import motion
+from warp_contact.types import Model
+
+MARGIN = 1.5  # on the damping rate: it grows with the fourth power of the stretch within a frame
+
+
+def internal_forces(model: Model, x: wp.array, mask: wp.array, f_tet: wp.array) -> None:
+    """Set the rows of ``f_tet`` [N], shape (n_tet, 4), where ``mask`` is not 0.
+
+    Undamped forces on the corners of each tet at the positions ``x`` [m]. ``motion.gather`` and
+    ``motion.predict`` sum them over the tets of a vertex. One launch per material model.
+    """
+    for e in model.elements:
+        wp.launch(
+            e.kernels.set_forces,
+            dim=e.tet.shape[0],
+            inputs=[e.tet, e.param, mask, model.tets, model.pose, model.volume, x],
+            outputs=[f_tet],
+        )
+
+
+def apply_stiffness(model: Model, x: wp.array, dx: wp.array, f_tet: wp.array) -> None:
+    """Set ``f_tet`` [N] to the corner entries of K(x) dx, K = -df/dx; ``dx`` [m]."""
+    for e in model.elements:
+        wp.launch(
+            e.kernels.apply_stiffness,
+            dim=e.tet.shape[0],
+            inputs=[e.tet, e.param, model.tets, model.pose, model.volume, x, dx],
+            outputs=[f_tet],
+        )
+
+
+def apply_damping(model: Model, x: wp.array, v: wp.array, f_tet: wp.array) -> None:
+    """Set ``f_tet`` [N] of the damped models to the corner entries of C(x) v; ``v`` [m/s]."""
+    for e in model.elements:
+        if e.damped:
+            wp.launch(
+                e.kernels.apply_damping,
+                dim=e.tet.shape[0],
+                inputs=[e.tet, e.param, model.tets, model.pose, model.volume, x, v],
+                outputs=[f_tet],
+            )
+
+
+def energies(model: Model, x: wp.array, energy: wp.array) -> None:
+    """Set ``energy`` [J], shape (n_tet,), to the elastic energy of each tet."""
+    for e in model.elements:
+        wp.launch(
+            e.kernels.energies,
+            dim=e.tet.shape[0],
+            inputs=[e.tet, e.param, model.tets, model.pose, model.volume, x],
+            outputs=[energy],
+        )
+
+
+def damp(
+    model: Model,
+    x: wp.array,
+    v: wp.array,
+    dt: wp.array,
+    f_tet: wp.array,
+    w: wp.array,
+    stages: int,
+) -> None:
+    """Damp ``v`` [m/s] over ``dt`` [s], shape (1,), at fixed positions ``x`` [m].
+
+    Solves M dv/dt = -C(x) v in ``stages`` stages of ``relax``: stable for
+    dt lambda_max(M^-1 C) <= stages^2 + stages (see ``stages_for``). Momentum is kept, kinetic
+    energy never grows, fixed vertices keep their velocity. Scratch: ``f_tet`` (n_tet, 4) and
+    ``w`` (n_vert,). Without a damped body nothing is launched.
+    """
+    if stages == 0 or not any(e.damped for e in model.elements):
+        return
+    if not all(e.damped for e in model.elements):
+        f_tet.zero_()
+    last, before = v, v
+    for j in range(1, stages + 1):
+        apply_damping(model, x, last, f_tet)
+        # A stage may overwrite Y_{j-1} or Y_{j-2}: only the entry of its own vertex is read.
+        out = v if j == stages else w if last is v else v
+        wp.launch(
+            motion.relax,
+            dim=model.n_vert,
+            inputs=[model.vt_start, model.vt_corner, f_tet, model.inv_mass, dt, j, stages],
+            outputs=[last, before, out],
+        )
+        last, before = out, last
+
+
+def stages_for(rate: float, dt: float) -> int:
+    """Return the stages that ``damp`` needs for lambda_max ``rate`` [1/s] and step ``dt`` [s]."""
+    z = MARGIN * rate * dt
+    return math.ceil(0.5 * (math.sqrt(1.0 + 4.0 * z) - 1.0))

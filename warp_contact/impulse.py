@@ -1,0 +1,68 @@
+"""Stage 5: impulses between the bodies, and the penalty forces that the paper compares with."""
+
+import warp as wp
+
+from warp_contact.kernels import impulse, penalty
+from warp_contact.response import Penalty
+from warp_contact.types import Model
+from warp_contact.work import Work
+
+SWEEPS = 4  # of the impulses in a step
+
+
+def begin(model: Model, work: Work, first: wp.array) -> None:
+    """Set ``contacts.weight``; contacts from ``first``, shape (1,), on have no impulse yet."""
+    c = work.contacts
+    wp.launch(
+        impulse.begin_contacts,
+        dim=work.capacity.contacts,
+        inputs=[first, c.n, c.vert, c.coef, c.start, model.inv_mass],
+        outputs=[c.weight, c.lam, c.slip],
+    )
+
+
+def exchange(model: Model, v: wp.array, work: Work) -> None:
+    """Change ``v`` by normal impulses and friction until no contact approaches."""
+    c = work.contacts
+    for _ in range(SWEEPS):
+        wp.launch(
+            impulse.solve_contacts,
+            dim=work.capacity.contacts,
+            inputs=[model.friction, c.n, c.vert, c.coef, c.normal, c.weight, v],
+            outputs=[c.lam, c.slip, c.change],
+        )
+        _apply(model, v, work)
+
+
+def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:
+    """Change ``v`` by the penalty forces at the depths found."""
+    c = work.contacts
+    wp.launch(
+        penalty.penalty_impulses,
+        dim=work.capacity.contacts,
+        inputs=[response.stiffness, response.damping, model.friction, work.dt]
+        + [c.n, c.vert, c.coef, c.normal, c.depth, c.weight, v],
+        outputs=[c.lam, c.slip, c.change],
+    )
+    _apply(model, v, work)
+
+
+def record(model: Model, work: Work, unit: float) -> None:
+    """Add the impulses of the step to their pairs of bodies, in counts of ``unit`` [N s]."""
+    c = work.contacts
+    wp.launch(
+        impulse.add_pair_impulses,
+        dim=work.capacity.contacts,
+        inputs=[unit, c.n, c.pair, c.normal, c.lam, c.slip],
+        outputs=[work.pair_key, work.pair_total, c.needed[4:5]],
+    )
+
+
+def _apply(model: Model, v: wp.array, work: Work) -> None:
+    c = work.contacts
+    wp.launch(
+        impulse.apply_impulses,
+        dim=model.n_vert,
+        inputs=[c.start, c.entry, c.coef, c.change, model.inv_mass],
+        outputs=[v, work.impulse],
+    )

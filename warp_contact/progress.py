@@ -1,0 +1,74 @@
+"""The line that says how far a run is."""
+
+import sys
+import time
+from typing import TextIO
+
+INTERVAL = 0.1  # between two writes of the line [s]
+
+
+class Progress:
+    """Frame, time, contacts, deepest overlap and time to go, on one line of a terminal.
+
+    Nothing is written where the stream is not a terminal, or when ``quiet``.
+    """
+
+    def __init__(self, n_frames: int, quiet: bool = False, stream: TextIO | None = None):
+        """Start the clock; ``stream`` is stderr by default."""
+        self.stream = sys.stderr if stream is None else stream
+        self.active = not quiet and self.stream.isatty()
+        self.n_frames = n_frames
+        self.done = self.width = 0
+        self.start = self.written = time.monotonic()
+        self._write(f"frame 0/{n_frames}  starting (kernels compile on their first use)")
+
+    def update(self, frame: int, seconds: float, n_contacts: int, overlap: float) -> None:
+        """Count a finished frame.
+
+        Args:
+            frame: its number
+            seconds: time in the scene [s]
+            n_contacts: contacts in its last step
+            overlap: deepest overlap after it [m]
+        """
+        self.done += 1
+        now = time.monotonic()
+        last = self.done == self.n_frames
+        if not last and self.done > 1 and now - self.written < INTERVAL:
+            return
+        self.written = now
+        left = (now - self.start) / self.done * (self.n_frames - self.done)
+        self._write(
+            f"frame {frame} ({self.done}/{self.n_frames})  t {seconds:.3f} s  "
+            f"{n_contacts} contacts  overlap {overlap:.1e} m  "
+            + ("done" if last else f"{clock(left)} to go")
+        )
+
+    def close(self) -> None:
+        """End the line."""
+        if self.active and self.width:
+            self.stream.write("\n")
+            self.stream.flush()
+            self.width = 0
+
+    def __enter__(self):
+        """Return the line."""
+        return self
+
+    def __exit__(self, *_):
+        """End the line."""
+        self.close()
+
+    def _write(self, text: str) -> None:
+        """Replace the line."""
+        if self.active:
+            self.stream.write("\r" + text.ljust(self.width))
+            self.stream.flush()
+            self.width = len(text)
+
+
+def clock(seconds: float) -> str:
+    """A duration as m:ss or h:mm:ss."""
+    minutes, s = divmod(round(seconds), 60)
+    h, m = divmod(minutes, 60)
+    return f"{h}:{m:02d}:{s:02d}" if h else f"{m}:{s:02d}"

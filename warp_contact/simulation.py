@@ -1,0 +1,289 @@
+"""A scene in motion: frames, automatic substeps, what a user reads and sets between frames."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+
+from warp_contact import solver
+from warp_contact.assemble import assemble
+from warp_contact.errors import SimulationError
+from warp_contact.forces import stages_for
+from warp_contact.measure import Measure, Meter
+from warp_contact.progress import Progress
+from warp_contact.response import ContactSurface, Penalty
+from warp_contact.scene import Body, Scene
+from warp_contact.spectrum import Spectrum
+from warp_contact.types import Capacity, State
+from warp_contact.work import Work, allocate_work
+
+SAFETY = 0.8  # of the stable step 2 / omega at the start of a frame
+UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
+REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
+UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
+ATTEMPTS = 12  # at a frame, with larger buffers or shorter steps each time
+
+
+class Simulation:
+    """Steps a scene frame by frame.
+
+    Attributes:
+        scene: as given
+        response: how bodies answer to an overlap
+        fps: frames per second
+        frame: number of the last finished frame
+        substeps: steps of the last frame
+        model: what stays constant, as Warp arrays
+        state: positions [m] and velocities [m/s] as Warp arrays, shape (n_vert,)
+        device: where all of it lives
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        response: ContactSurface | Penalty | None = None,
+        fps: float = 60,
+        substeps: int | None = None,
+        device: str | None = None,
+    ):
+        """Lay out a scene.
+
+        Args:
+            scene: bodies and half-spaces
+            response: ``ContactSurface()`` by default
+            fps: frames per second
+            substeps: steps in each frame; None takes the stable step of the assembled system,
+                shorter where bodies approach each other fast
+            device: ``cpu``, ``cuda:0``, ...; None takes Warp's default
+
+        Raises:
+            ValueError: for an empty scene, an unknown device, fps or substeps that are not positive
+        """
+        if not (math.isfinite(fps) and fps > 0.0):
+            raise ValueError(f"fps {fps} is not positive")
+        if substeps is not None and (int(substeps) != substeps or substeps < 1):
+            raise ValueError(f"substeps {substeps} is not a positive count")
+        self.scene = scene
+        self.response = ContactSurface() if response is None else response
+        self.fps = fps
+        self.frame = 0
+        self.substeps = 0
+        self._wanted = substeps
+        self.device = _device(device)
+        with wp.ScopedDevice(self.device):
+            self.model, self.state = assemble(scene)
+            self._spectrum = Spectrum(self.model)
+            self._meter = Meter(self.model)
+            self._work: Work = allocate_work(self.model, self.state, Capacity())
+            self._saved = State(wp.clone(self.state.x), wp.clone(self.state.v))
+        inv_mass = self.model.inv_mass.numpy()
+        mobile = float(self.model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
+        self._unit = UNIT * (mobile if mobile > 0.0 else 1.0)
+        self._thickness = float(self.model.body_thickness.numpy().min())
+        self._largest_inv_mass = float(inv_mass.max())
+        self._graphs: dict[int, wp.Graph] = {}
+        self._rates: tuple[float, float] | None = None
+
+    @property
+    def time(self) -> float:
+        """Time of the last finished frame [s]."""
+        return self.frame / self.fps
+
+    def frames(self, n: int, progress: bool = False) -> Iterator[int]:
+        """Step ``n`` frames and yield the number of each when it is finished.
+
+        Raises:
+            SimulationError: a position or velocity is no longer finite; the state stays that of
+                the last finished frame
+        """
+        line = Progress(n) if progress else None
+        for _ in range(n):
+            self.step_frame()
+            if line:
+                measured = self.measure()
+                line.update(self.frame, self.time, measured.n_contacts, measured.overlap)
+            yield self.frame
+        if line:
+            line.close()
+
+    def step_frame(self) -> None:
+        """Step one frame.
+
+        A frame that outgrew its buffers, or whose step turned out too long for the deformation
+        that came, is repeated from its start: nothing is lost.
+        """
+        with wp.ScopedDevice(self.device):
+            wp.copy(self._saved.x, self.state.x)
+            wp.copy(self._saved.v, self.state.v)
+            omega, rate = self._rates or self._spectra()
+            for _attempt in range(ATTEMPTS):
+                dt = self._run(omega, rate)
+                if self._grow():
+                    self._restore()
+                    continue
+                self._check_finite()
+                after = self._spectra()
+                if self._wanted is not None or dt * after[0] <= UNSTABLE:
+                    break
+                omega, rate = max(1.2 * omega, after[0]), max(rate, after[1])
+                self._restore()
+            self._rates = after
+            self.frame += 1
+
+    def positions(self, body: Body | int | None = None) -> np.ndarray:
+        """Copy of the positions [m] of one body or of all, shape (n, 3)."""
+        return self.state.x.numpy()[self._range(body)].copy()
+
+    def velocities(self, body: Body | int | None = None) -> np.ndarray:
+        """Copy of the velocities [m/s] of one body or of all, shape (n, 3)."""
+        return self.state.v.numpy()[self._range(body)].copy()
+
+    def set_velocity(self, body: Body | int, velocity, vertices=None) -> None:
+        """Set velocities [m/s] between frames; fixed vertices keep theirs from then on.
+
+        Args:
+            body: the body
+            velocity: shape (3,), or (k, 3) for k vertices
+            vertices: mask or ids within the body; None for all
+        """
+        where = self._range(body)
+        v = self.state.v.numpy().copy()
+        part = v[where]
+        part[slice(None) if vertices is None else np.asarray(vertices)] = velocity
+        if not np.isfinite(part).all():
+            raise ValueError(f"velocity of body '{self._label(body)}' is not finite")
+        v[where] = part
+        self.state.v.assign(v)
+
+    def measure(self) -> Measure:
+        """Energies, momenta, overlap, contacts and contact forces of the last frame."""
+        with wp.ScopedDevice(self.device):
+            duration = 1.0 / self.fps if self.frame else 0.0
+            return self._meter.measure(self.state, self._work, self._unit, duration)
+
+    def contact_fields(self) -> dict[str, np.ndarray]:
+        """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
+
+        The partner is a body's index, n_body + p for plane p, -1 for none; it and the penetration
+        are those of the last step, found at its predicted positions. Shapes (n_vert,).
+        """
+        c = self._work.contacts
+        n = int(c.n.numpy()[0])
+        vert, coef = c.vert.numpy()[:n], c.coef.numpy()[:n]
+        pair, depth = c.pair.numpy()[:n], c.depth.numpy()[:n]
+        penetration = np.zeros(self.model.n_vert, dtype=np.float32)
+        partner = np.full(self.model.n_vert, -1, dtype=np.int32)
+        for k in range(5):
+            on = coef[:, k] != 0.0
+            np.maximum.at(penetration, vert[on, k], depth[on])
+            partner[vert[on, k]] = pair[on, 1 if k < 2 else 0]
+        impulse = np.linalg.norm(self._work.impulse.numpy(), axis=1)
+        pressure = impulse * self.fps / np.maximum(self._vertex_area(), 1e-30)
+        return {
+            "pressure": pressure.astype(np.float32),
+            "penetration": penetration,
+            "partner": partner,
+        }
+
+    def _run(self, omega: float, rate: float) -> float:
+        """Step one frame at the rates [1/s] given; return the step [s]."""
+        work = self._work
+        n = self._wanted or self._substeps(omega)
+        dt = 1.0 / (self.fps * n)
+        stages = stages_for(rate, dt)
+        work.dt.fill_(dt)
+        work.impulse.zero_()
+        work.pair_key.fill_(-1)
+        work.pair_total.zero_()
+        work.contacts.needed.zero_()
+        work.bodies.rebuild()
+        graph = self._graph(stages)
+        for _ in range(n):
+            wp.capture_launch(graph)
+        self.substeps = n
+        return dt
+
+    def _substeps(self, omega: float) -> int:
+        """Equal steps in a frame: stable, and short against the thinnest body."""
+        if isinstance(self.response, Penalty):
+            omega = math.sqrt(omega**2 + 4.0 * self.response.stiffness * self._largest_inv_mass)
+        v = self.state.v.numpy()
+        speed = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0)))
+        speed += float(np.linalg.norm(self.model.gravity)) / self.fps
+        stable = omega / (2.0 * SAFETY)
+        seen = speed / (REACH * self._thickness)
+        return max(1, math.ceil(max(stable, seen) / self.fps))
+
+    def _graph(self, stages: int) -> wp.Graph:
+        """The captured step with so many stages of damping."""
+        if stages not in self._graphs:
+            arguments = self.model, self.state, self._work, self.response, stages, self._unit
+            with wp.ScopedCapture() as capture:
+                solver.step(*arguments)
+            self._graphs[stages] = capture.graph
+        return self._graphs[stages]
+
+    def _grow(self) -> bool:
+        """Enlarge the buffers that the frame outgrew; True if there were any."""
+        contacts, slots, edge_slots, near, pairs = self._work.contacts.needed.numpy().tolist()
+        if not (contacts or slots or edge_slots or near or pairs):
+            return False
+        old = self._work.capacity
+        capacity = replace(
+            old,
+            contacts=max(old.contacts, 2 * contacts),
+            slots=max(old.slots, 2 * old.slots if slots else 0),
+            edge_slots=max(old.edge_slots, edge_slots),
+            near=max(old.near, 2 * near),
+            pairs=max(old.pairs, 2 * pairs),
+        )
+        self._work = allocate_work(self.model, self._saved, capacity)
+        self._graphs.clear()
+        return True
+
+    def _restore(self) -> None:
+        wp.copy(self.state.x, self._saved.x)
+        wp.copy(self.state.v, self._saved.v)
+
+    def _spectra(self) -> tuple[float, float]:
+        """Largest frequency of the elastic forces and largest damping rate, at the state [1/s]."""
+        return self._spectrum.omega(self.state.x), self._spectrum.damping_rate(self.state.x)
+
+    def _check_finite(self) -> None:
+        finite = np.isfinite(self.state.x.numpy()).all(1) & np.isfinite(self.state.v.numpy()).all(1)
+        if not finite.all():
+            vertex = int((~finite).argmax())
+            body = int(self.model.vert_body.numpy()[vertex])
+            vertex -= int(self.model.body_vert.numpy()[body])
+            self._restore()
+            raise SimulationError(
+                f"frame {self.frame + 1}: body '{self.model.labels[body]}', vertex {vertex} is no "
+                f"longer finite ({self.substeps} substeps)"
+            )
+
+    def _range(self, body: Body | int | None) -> slice:
+        if body is None:
+            return slice(None)
+        index = body.index if isinstance(body, Body) else int(body)
+        first, last = self.model.body_vert.numpy()[index : index + 2].tolist()
+        return slice(first, last)
+
+    def _label(self, body: Body | int) -> str:
+        return self.model.labels[body.index if isinstance(body, Body) else int(body)]
+
+    def _vertex_area(self) -> np.ndarray:
+        """A third of the surface around each vertex [m^2], shape (n_vert,)."""
+        tris, x = self.model.tris.numpy(), self.state.x.numpy().astype(np.float64)
+        a, b, c = np.moveaxis(x[tris], 1, 0)
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+        return np.bincount(tris.ravel(), np.repeat(area, 3), minlength=self.model.n_vert)
+
+
+def _device(name: str | None) -> wp.Device:
+    try:
+        return wp.get_device(name)
+    except ValueError:
+        known = ", ".join(device.alias for device in wp.get_devices())
+        raise ValueError(f"unknown device '{name}'; this machine has {known}") from None

@@ -1,0 +1,112 @@
+"""One time step, read from top to bottom."""
+
+import warp as wp
+
+from warp_contact import depth, detect, impulse, surface
+from warp_contact.forces import damp, internal_forces
+from warp_contact.kernels import motion
+from warp_contact.response import ContactSurface, Penalty
+from warp_contact.types import Model, State
+from warp_contact.work import Work
+
+
+def step(
+    model: Model,
+    state: State,
+    work: Work,
+    response: ContactSurface | Penalty,
+    stages: int,
+    unit: float,
+) -> None:
+    """Advance ``state`` in place by ``work.dt``, symplectic Euler.
+
+    No read-back and no allocation, so that a caller may capture it. ``stages`` are those of the
+    damping, ``unit`` [N s] is the resolution of the recorded contact impulses.
+    """
+    if isinstance(response, Penalty):
+        detect.near_bodies(model, state.x, state.x, work)
+        vertex_contacts(model, state.x, work)  # forces belong to the positions they act at
+        edge_contacts(model, state.x, work)
+        predict(model, state, work, stages)
+        impulse.push(model, state.v, work, response)
+        drift(model, state, work, state.x)
+    elif response.search == "literal":
+        predict(model, state, work, stages)
+        detect.near_bodies(model, state.x, work.x, work)
+        wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
+        vertex_contacts(model, state.x, work)
+        move_surfaces(model, state, work, response)
+        impulse.exchange(model, state.v, work)
+    else:
+        predict(model, state, work, stages)
+        detect.near_bodies(model, state.x, work.x, work)
+        vertex_contacts(model, work.x, work)
+        impulse.exchange(model, state.v, work)
+        drift(model, state, work, work.x)
+        edge_contacts(model, work.x, work, after=lambda: impulse.exchange(model, state.v, work))
+        drift(model, state, work, state.x)
+        move_surfaces(model, state, work, response)  # what the step did not create
+    impulse.record(model, work, unit)
+
+
+def predict(model: Model, state: State, work: Work, stages: int) -> None:
+    """Kick ``state.v`` by internal forces and gravity, damp it, set ``work.x`` = x + h v."""
+    internal_forces(model, state.x, work.ones, work.f_tet)
+    wp.launch(
+        motion.predict,
+        dim=model.n_vert,
+        inputs=[model.vt_start, model.vt_corner, work.f_tet, model.inv_mass]
+        + [wp.vec3(*model.gravity), work.dt, state.x, state.v],
+        outputs=[work.x, state.v],
+    )
+    if stages > 0:
+        damp(model, state.x, state.v, work.dt, work.f_tet, work.v, stages)
+        drift(model, state, work, work.x)
+
+
+def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
+    """Set ``out`` = x + h v."""
+    wp.launch(
+        motion.advance, dim=model.n_vert, inputs=[work.dt, state.x, state.v], outputs=[out]
+    )
+
+
+def vertex_contacts(model: Model, x: wp.array, work: Work) -> None:
+    """Stages 1 and 2: contacts of vertices inside other bodies at the positions ``x``."""
+    detect.find_inside(model, x, work)
+    detect.list_hits(model, x, work)
+    depth.hit_depths(model, x, work)
+    depth.vertex_contacts(model, x, work)
+    depth.contacts_by_vertex(model, work)
+    impulse.begin(model, work, work.none)
+
+
+def edge_contacts(model: Model, x: wp.array, work: Work, after=None) -> None:
+    """Stages 1 and 2: contacts of edges across other bodies at ``x``, and what to do if any."""
+    detect.find_crossings(model, x, work)
+
+    def append() -> None:
+        depth.edge_contacts(model, x, work)
+        depth.contacts_by_vertex(model, work)
+        impulse.begin(model, work, work.n_hit)
+        if after:
+            after()
+
+    wp.capture_if(work.n_crossing, append)
+
+
+def move_surfaces(model: Model, state: State, work: Work, response: ContactSurface) -> None:
+    """Stages 3 and 4: displace the surfaces onto a common one; velocities do not change."""
+    surface.leftover(model, state.x, work)
+
+    def search() -> None:
+        surface.begin_search(model, state.x, work)
+        if response.search == "literal":
+            surface.bisect(model, state.x, work, response)
+        else:
+            surface.share_by_mass(model, work)
+            surface.balance(model, state.x, work, response)
+            surface.close(model, state.x, work)
+
+    wp.capture_if(work.found, search)
+

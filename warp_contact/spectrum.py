@@ -1,0 +1,158 @@
+"""The fastest elastic mode and the fastest damping of a scene, for the choice of the step."""
+
+from collections.abc import Callable
+
+import numpy as np
+import warp as wp
+
+from warp_contact import forces
+from warp_contact.kernels import lanczos
+from warp_contact.types import Model
+
+DEPTH = 8  # Lanczos vectors kept
+CHUNK = 64  # vertices summed by one thread
+FIRST, LATER = 8, 2  # most restarts in the first call, in later calls
+NOISE = 0.1  # random part of a warm start, so that a mode elsewhere can come up
+TOLERANCE = 0.02  # gap between the estimate and its bound that ends the restarts, of lambda
+SEED = 20051125
+
+
+class Spectrum:
+    """Largest eigenvalues of M^-1 K and of M^-1 C, assembled, fixed vertices left out.
+
+    Restarted Lanczos in the mass inner product, separately for every body but in the same
+    launches, so that a small stiff body is not drowned by the others. The result is the largest
+    |Ritz value| + residual norm of any body: there is an eigenvalue that close, and in practice
+    it bounds the spectrum (Zhou, Saad, Tiago, Chelikowsky 2006, "Self-consistent-field
+    calculations using Chebyshev-filtered subspace iteration", section 3.2). Measured: 0 to 2 % above
+    the true lambda, hence 0 to 1 % in omega.
+
+    Later calls start from the last result and need one restart, that is ``DEPTH`` products with K.
+    Deterministic: the first start vector is a fixed random one. Reads back once per restart.
+    """
+
+    def __init__(self, model: Model) -> None:
+        """Allocate about 120 bytes per vertex and 48 per tet on the current device."""
+        self._model = model
+        chunk, body_chunk = _chunks(model.body_vert.numpy())
+        self._chunk = wp.array(chunk, dtype=int)
+        self._body_chunk = wp.array(body_chunk, dtype=int)
+        self._part = wp.empty(len(chunk) - 1, dtype=wp.float64)
+        self._coef = wp.empty((2 * DEPTH + 1, model.n_body), dtype=wp.float64)
+        self._ritz = wp.zeros((model.n_body, DEPTH), dtype=float)
+        self._basis = wp.zeros((DEPTH + 1, model.n_vert), dtype=wp.vec3)
+        self._f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+        self._x = wp.empty(model.n_vert, dtype=wp.vec3)
+        noise = np.random.default_rng(SEED).standard_normal((model.n_vert, 3))
+        self._noise = wp.array(_unit(noise, model), dtype=wp.vec3)
+        self._start: dict[Callable, wp.array] = {}
+        self._graph: dict[Callable, wp.Graph] = {}
+
+    def omega(self, x: wp.array) -> float:
+        """Angular frequency [1/s] of the fastest mode at the positions ``x`` [m].
+
+        Symplectic Euler is stable for steps below 2 / omega. K may be indefinite: the largest
+        magnitude counts. 0 when no vertex is free.
+        """
+        return self._largest(forces.apply_stiffness, x) ** 0.5
+
+    def damping_rate(self, x: wp.array) -> float:
+        """Largest eigenvalue [1/s] of M^-1 C at the positions ``x`` [m]; 0 without damping."""
+        damped = [e.damped for e in self._model.elements]
+        if not any(damped):
+            return 0.0
+        if not all(damped):
+            self._f_tet.zero_()
+        return self._largest(forces.apply_damping, x)
+
+    def _largest(self, apply: Callable, x: wp.array) -> float:
+        wp.copy(self._x, x)
+        first = apply not in self._start
+        if first:
+            self._start[apply] = wp.clone(self._noise)
+        wp.copy(self._basis[0], self._start[apply])
+        self._combine(np.eye(1, DEPTH).repeat(self._model.n_body, axis=0), 0.0 if first else NOISE)
+        bound = 0.0
+        for _ in range(FIRST if first else LATER):
+            self._cycle(apply)
+            theta, residual, ritz = _ritz_pairs(self._coef.numpy())
+            self._combine(ritz, 0.0)
+            bound = float(np.max(theta + residual))
+            if bound <= (1.0 + TOLERANCE) * float(np.max(theta)):
+                break
+        wp.copy(self._start[apply], self._basis[0])
+        return bound
+
+    def _combine(self, ritz: np.ndarray, noise: float) -> None:
+        """Set row 0 of the basis to a sum of its rows, for each body."""
+        m = self._model
+        self._ritz.assign(ritz.astype(np.float32))
+        wp.launch(
+            lanczos.add_noise,
+            dim=m.n_vert,
+            inputs=[m.inv_mass, self._noise, m.vert_body, self._ritz, noise],
+            outputs=[self._basis],
+        )
+
+    def _cycle(self, apply: Callable) -> None:
+        """Run ``DEPTH`` Lanczos steps from row 0 of the basis; sets all of ``coef``."""
+        if apply not in self._graph:
+            with wp.ScopedCapture() as capture:
+                self._orthogonalise(-1)
+                for j in range(DEPTH):
+                    apply(self._model, self._x, self._basis[j], self._f_tet)
+                    self._multiply(j)
+                    self._orthogonalise(j)
+            self._graph[apply] = capture.graph
+        wp.capture_launch(self._graph[apply])
+
+    def _multiply(self, j: int) -> None:
+        m = self._model
+        inputs = [self._chunk, m.vt_start, m.vt_corner, self._f_tet, m.mass, m.inv_mass, j]
+        outputs = [self._basis, self._part]
+        wp.launch(lanczos.multiply, dim=self._part.shape[0], inputs=inputs, outputs=outputs)
+        self._add_up(2 * j + 1)
+
+    def _orthogonalise(self, j: int) -> None:
+        m = self._model
+        inputs = [self._chunk, m.vert_body, m.mass, self._coef, j]
+        outputs = [self._basis, self._part]
+        wp.launch(lanczos.orthogonalise, dim=self._part.shape[0], inputs=inputs, outputs=outputs)
+        self._add_up(2 * j + 2)
+        inputs = [m.vert_body, self._coef, j + 1]
+        wp.launch(lanczos.normalise, dim=m.n_vert, inputs=inputs, outputs=[self._basis])
+
+    def _add_up(self, row: int) -> None:
+        inputs = [self._body_chunk, self._part, row]
+        wp.launch(lanczos.add_up, dim=self._model.n_body, inputs=inputs, outputs=[self._coef])
+
+
+def _chunks(body_vert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First vertex of each chunk, closed by n_vert, and first chunk of each body."""
+    count = -(-np.diff(body_vert) // CHUNK)
+    body_chunk = np.concatenate([[0], np.cumsum(count)])
+    within = np.arange(body_chunk[-1]) - np.repeat(body_chunk[:-1], count)
+    first = np.repeat(body_vert[:-1], count) + CHUNK * within
+    return np.append(first, body_vert[-1]), body_chunk
+
+
+def _unit(u: np.ndarray, model: Model) -> np.ndarray:
+    """Give the part of ``u`` on the free vertices of each body the mass norm 1."""
+    u = np.where(model.inv_mass.numpy()[:, None] > 0.0, u, 0.0)
+    body = model.vert_body.numpy()
+    norm2 = np.bincount(body, model.mass.numpy() * (u * u).sum(axis=1), minlength=model.n_body)
+    return u / np.sqrt(np.where(norm2 > 0.0, norm2, 1.0))[body, None]
+
+
+def _ritz_pairs(coef: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Largest |Ritz value| of each body, its residual norm, and its vector in the basis."""
+    a, b = coef[1::2].T, np.sqrt(coef[2::2]).T  # (n_body, DEPTH)
+    t = np.zeros((*a.shape, DEPTH))
+    k = np.arange(DEPTH)
+    t[:, k, k] = a
+    t[:, k[1:], k[:-1]] = b[:, :-1]
+    value, vector = np.linalg.eigh(t)
+    best = np.argmax(np.abs(value), axis=1)
+    body = np.arange(len(t))
+    ritz = vector[body, :, best]
+    return np.abs(value[body, best]), b[:, -1] * np.abs(ritz[:, -1]), ritz

@@ -1,0 +1,292 @@
+"""USD output that survives the end of its process, and its reader.
+
+    <dir>/<name>.usda           root: metadata and the clip range, rewritten after each frame
+    <dir>/topology.usdc         prims, faces, tets, materials: once
+    <dir>/manifest.usdc         which attributes the frames carry: once
+    <dir>/frames/f.000012.usdc  what changes: one file a frame
+
+Each file is written under another name and then renamed, a frame before the root that counts it.
+So at any moment the root names finished frames only, and all of them.
+
+Each surface carries ``primvars:contact:pressure`` [Pa], ``penetration`` [m] and ``partner``: the
+index of the other body, n_body + p for half-space p, -1 for none. Pressure and penetration are
+rounded to a thousandth of their largest value on the body, which packs them to half the size.
+"""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+
+from warp_contact.usd_scene import heated, parts, topology
+
+LEVELS = 1000  # distinct values of a scalar in a frame: the crate format packs up to about 1024
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body as it is read: ``mesh`` is its surface, ``sim`` its tets (None if not written)."""
+
+    label: str
+    mesh: UsdGeom.Mesh
+    sim: UsdGeom.TetMesh | None
+    fixed: bool
+
+
+class UsdWriter:
+    """Writes one frame of ``sim`` at each ``write()``; a context manager."""
+
+    def __init__(
+        self,
+        path,
+        sim,
+        velocities: bool = False,
+        tets: bool = True,
+        flatten: bool = False,
+        *,
+        animate_tets: bool = False,
+        view: tuple | None = None,
+        pressure_scale: float | None = None,
+    ):
+        """Start a file; an earlier one at the same place is removed.
+
+        Args:
+            path: a directory, whose name the root layer takes, or the ``.usda`` root layer itself
+            sim: the simulation; its model, positions and contact fields are what is written
+            velocities: write the surface velocities [m/s] too
+            tets: write each body's TetMesh, purpose guide
+            flatten: ``close()`` also writes everything into one ``<name>.usdc``
+            animate_tets: time-sample the points of the TetMeshes, inner vertices included
+            view: eye and target [m] of a camera to write
+            pressure_scale: pressure [Pa] drawn as fully hot; None takes twice the hydrostatic
+                pressure over the scene's size, or without gravity the highest pressure so far
+        """
+        self.root = root_path(path)
+        self.sim, self.velocities, self.flatten = sim, velocities, flatten
+        self.animate_tets = animate_tets and tets
+        self.start = self.end = None
+        self.parts = parts(sim.model)
+        self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
+        self.grows = self.scale == 0.0
+        frames = self.root.parent / "frames"
+        frames.mkdir(parents=True, exist_ok=True)
+        self.root.unlink(missing_ok=True)
+        stale = [*frames.glob("f.*.usdc"), *frames.glob(".tmp.*"), self.root.with_suffix(".usdc")]
+        for old in stale:
+            old.unlink(missing_ok=True)
+        export(topology(self.parts, sim, tets, view), self.root.parent / "topology.usdc")
+        self.layer = self._declare()
+        export(self.layer, self.root.parent / "manifest.usdc")
+        self._write_root()
+
+    def __enter__(self):
+        """Return the writer."""
+        return self
+
+    def __exit__(self, kind, *_):
+        """Close; after an error what was written stays and nothing is flattened."""
+        if kind is None:
+            self.close()
+
+    def write(self) -> None:
+        """Write the state of the simulation as frame ``sim.frame``."""
+        frame = self.sim.frame
+        if self.end is not None and frame != self.end + 1:
+            raise ValueError(f"frame {frame} cannot follow frame {self.end}")
+        for path, value in self._values():
+            if self.end is not None:
+                self.layer.EraseTimeSample(path, self.end)
+            self.layer.SetTimeSample(path, frame, value)
+        export(self.layer, self.root.parent / "frames" / f"f.{frame:06d}.usdc")
+        self.start = frame if self.start is None else self.start
+        self.end = frame
+        self._write_root()
+
+    def close(self) -> None:
+        """Flatten, if asked to."""
+        if self.flatten and self.end is not None:
+            export(open_stage(self.root).Flatten(), self.root.with_suffix(".usdc"))
+
+    def _values(self):
+        """The attributes of this frame: path and value."""
+        x = np.ascontiguousarray(self.sim.positions(), dtype=np.float32)
+        v = np.asarray(self.sim.velocities(), dtype=np.float32) if self.velocities else None
+        fields = self.sim.contact_fields()
+        if self.grows:
+            self.scale = max(self.scale, float(fields["pressure"].max(initial=0.0)))
+        for part in self.parts:
+            mesh, points = f"{part.path}/surface.", Vt.Vec3fArray.FromNumpy(x[part.ids])
+            yield mesh + "points", points
+            yield mesh + "extent", UsdGeom.PointBased.ComputeExtent(points)
+            if v is not None:
+                yield mesh + "velocities", Vt.Vec3fArray.FromNumpy(v[part.ids])
+            pressure = fields["pressure"][part.ids]
+            color = heated(part.color, pressure / self.scale if self.scale > 0.0 else pressure)
+            yield mesh + "primvars:displayColor", Vt.Vec3fArray.FromNumpy(color)
+            for name in "pressure", "penetration":
+                value = Vt.FloatArray.FromNumpy(rounded(fields[name][part.ids]))
+                yield f"{mesh}primvars:contact:{name}", value
+            partner = np.ascontiguousarray(fields["partner"][part.ids], dtype=np.int32)
+            yield mesh + "primvars:contact:partner", Vt.IntArray.FromNumpy(partner)
+            if self.animate_tets:
+                points = Vt.Vec3fArray.FromNumpy(x[slice(*part.verts)])
+                yield f"{part.path}/sim.points", points
+                yield f"{part.path}/sim.extent", UsdGeom.PointBased.ComputeExtent(points)
+
+    def _declare(self) -> Sdf.Layer:
+        """A layer that holds every attribute of a frame, without values."""
+        layer = Sdf.Layer.CreateAnonymous(".usdc")
+        layer.timeCodesPerSecond = layer.framesPerSecond = self.sim.fps
+        types = Sdf.ValueTypeNames
+        surface = {
+            "points": types.Point3fArray,
+            "extent": types.Float3Array,
+            "primvars:displayColor": types.Color3fArray,
+            "primvars:contact:pressure": types.FloatArray,
+            "primvars:contact:penetration": types.FloatArray,
+            "primvars:contact:partner": types.IntArray,
+        }
+        if self.velocities:
+            surface["velocities"] = types.Vector3fArray
+        prims = {"surface": surface}
+        if self.animate_tets:
+            prims["sim"] = {"points": types.Point3fArray, "extent": types.Float3Array}
+        for part in self.parts:
+            for prim, attributes in prims.items():
+                spec = Sdf.CreatePrimInLayer(layer, f"{part.path}/{prim}")
+                for name, kind in attributes.items():
+                    Sdf.AttributeSpec(spec, name, kind)
+        return layer
+
+    def _write_root(self) -> None:
+        """Make the root layer name the frames written so far."""
+        layer = Sdf.Layer.CreateAnonymous(".usda")
+        layer.subLayerPaths.append("./topology.usdc")
+        layer.defaultPrim = "World"
+        layer.timeCodesPerSecond = layer.framesPerSecond = self.sim.fps
+        layer.startTimeCode = self.sim.frame if self.start is None else self.start
+        layer.endTimeCode = layer.startTimeCode if self.end is None else self.end
+        for key, value in ("upAxis", "Z"), ("metersPerUnit", 1.0), ("kilogramsPerUnit", 1.0):
+            layer.pseudoRoot.SetInfo(key, value)
+        world = Sdf.CreatePrimInLayer(layer, "/World")
+        if self.end is not None:
+            clips = {
+                "templateAssetPath": "./frames/f.######.usdc",
+                "templateStartTime": float(self.start),
+                "templateEndTime": float(self.end),
+                "templateStride": 1.0,
+                "manifestAssetPath": Sdf.AssetPath("./manifest.usdc"),
+                "primPath": "/World",
+            }
+            world.SetInfo("clips", {"default": clips})
+        temporary = self.root.with_name(f".{self.root.name}.tmp")
+        temporary.write_text(layer.ExportToString(), encoding="utf-8")
+        os.replace(temporary, self.root)
+
+
+def root_path(path) -> Path:
+    """The root layer that ``path``, a directory or a ``.usda`` file, stands for."""
+    path = Path(path).resolve()
+    if path.suffix == ".usda":
+        return path
+    if path.suffix.startswith(".usd") or path.is_file():
+        raise ValueError(f"{path.name}: give a directory or the path of a .usda file")
+    return path / f"{path.name or 'simulation'}.usda"
+
+
+def export(layer: Sdf.Layer, path: Path) -> None:
+    """Write a layer so that ``path`` is either absent, old or complete."""
+    temporary = path.with_name(f".tmp.{path.name}")
+    if not layer.Export(str(temporary)):
+        raise OSError(f"cannot write {path}")
+    os.replace(temporary, path)
+
+
+def rounded(value: np.ndarray) -> np.ndarray:
+    """The values on a scale of at most ``LEVELS`` steps between 0 and their largest."""
+    value = np.ascontiguousarray(value, dtype=np.float32)
+    step = np.float32(np.abs(value).max(initial=0.0) / (LEVELS - 1))
+    return np.rint(value / step) * step if step > 0.0 else value
+
+
+def hydrostatic(sim) -> float:
+    """Twice the pressure [Pa] at the bottom of a column as high as the scene; 0 without gravity."""
+    densities = [getattr(material, "density", 0.0) or 0.0 for material in sim.model.materials]
+    x = sim.positions()
+    size = float(np.linalg.norm(np.ptp(x, axis=0)))
+    return 2.0 * max(densities, default=0.0) * float(np.linalg.norm(sim.model.gravity)) * size
+
+
+def open_stage(path) -> Usd.Stage:
+    """The stage at ``path``: a directory that a ``UsdWriter`` filled, or a USD file."""
+    path = Path(path)
+    if path.is_dir():
+        path = root_path(path) if root_path(path).exists() else only_root(path)
+    if not path.exists():
+        raise FileNotFoundError(f"no such file: {path}")
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        raise OSError(f"{path} is not a readable USD file") from error
+    stage.Reload()  # a layer that is still held from before may be out of date
+    return stage
+
+
+def only_root(directory: Path) -> Path:
+    """The one root layer in a directory."""
+    roots = sorted(directory.glob("*.usda"))
+    if len(roots) != 1:
+        raise FileNotFoundError(f"{directory} holds {len(roots) or 'no'} .usda files, not one")
+    return roots[0]
+
+
+def frame_numbers(stage: Usd.Stage) -> range:
+    """The frames of a stage."""
+    return range(round(stage.GetStartTimeCode()), round(stage.GetEndTimeCode()) + 1)
+
+
+def read_bodies(stage: Usd.Stage) -> list[Body]:
+    """The bodies of a stage in the order of their indices."""
+    found = []
+    for prim in stage.GetDefaultPrim().GetChildren():
+        index = read_note(prim, "body")
+        if index is None:
+            continue
+        sim = prim.GetChild("sim")
+        body = Body(
+            label=read_note(prim, "label"),
+            mesh=UsdGeom.Mesh(prim.GetChild("surface")),
+            sim=UsdGeom.TetMesh(sim) if sim else None,
+            fixed=bool(read_note(prim, "fixed")),
+        )
+        found.append((index, body))
+    return [body for _, body in sorted(found, key=lambda pair: pair[0])]
+
+
+def read_points(stage: Usd.Stage, frame: int) -> dict[str, np.ndarray]:
+    """Surface points [m] of each body at a frame by its label, shape (n, 3)."""
+    bodies = read_bodies(stage)
+    return {body.label: np.asarray(body.mesh.GetPointsAttr().Get(frame)) for body in bodies}
+
+
+def read_planes(stage: Usd.Stage) -> list[tuple[np.ndarray, float]]:
+    """Normal and offset [m] of each half-space."""
+    prims = stage.GetDefaultPrim().GetChildren()
+    pairs = [(read_note(prim, "normal"), read_note(prim, "offset")) for prim in prims]
+    return [(np.array(n), h) for n, h in pairs if n is not None and h is not None]
+
+
+def read_view(stage: Usd.Stage) -> tuple[np.ndarray, np.ndarray] | None:
+    """Eye and target [m] of the camera, if there is one."""
+    prim = stage.GetDefaultPrim().GetChild("view")
+    if not prim:
+        return None
+    eye, target = read_note(prim, "eye"), read_note(prim, "target")
+    return None if eye is None or target is None else (np.array(eye), np.array(target))
+
+
+def read_note(prim: Usd.Prim, name: str):
+    """A constant under ``userProperties``, None if it is not there."""
+    return prim.GetAttribute(f"userProperties:{name}").Get()

@@ -1,0 +1,236 @@
+"""The prims of a USD file that do not change during a run: bodies, tets, materials, half-spaces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
+
+PALETTE = ("4c86b8", "6fa868", "dfb84e", "9579b6", "48a39b", "c9a57d", "c487a6", "71849f")  # sRGB
+FIXED, GROUND = "c4c4c0", "b9b9b5"  # sRGB
+WARM, HOT = "f08a24", "c3241c"  # sRGB, at half and at full pressure
+ROOM = 4.0  # half the width of a drawn half-space, in scene diagonals
+FOV = 28.0  # vertical angle of view [degrees]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A body as it is written.
+
+    Attributes:
+        path: its prim
+        ids: its surface vertices in the flat arrays, shape (n,)
+        faces: triangles over ``ids``, shape (f, 3)
+        verts: its first vertex and the one past its last
+        fixed: whether none of its vertices moves freely
+        color: linear base colour, shape (3,)
+    """
+
+    path: str
+    ids: np.ndarray
+    faces: np.ndarray
+    verts: tuple[int, int]
+    fixed: bool
+    color: np.ndarray
+
+
+def linear(srgb: str) -> np.ndarray:
+    """Linear colour of an sRGB hex code."""
+    c = np.frombuffer(bytes.fromhex(srgb), dtype=np.uint8) / 255.0
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def heated(base: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+    """Base colour blended over orange to red; the square root shows light contact too."""
+    s = np.sqrt(np.clip(pressure, 0.0, 1.0)).astype(np.float32)[:, None]
+    warm, hot = linear(WARM), linear(HOT)
+    low, high = np.minimum(2.0 * s, 1.0), np.maximum(2.0 * s - 1.0, 0.0)
+    return np.ascontiguousarray(base + low * (warm - base) + high * (hot - warm), dtype=np.float32)
+
+
+def parts(model) -> list[Part]:
+    """The bodies of a model with their prims, surface vertices and colours."""
+    tris, inv_mass = model.tris.numpy().reshape(-1, 3), model.inv_mass.numpy()
+    tri, vert = model.body_tri.numpy(), model.body_vert.numpy()
+    taken, result = {"Looks", "view"}, []
+    for b, label in enumerate(model.labels):
+        ids, faces = np.unique(tris[tri[b] : tri[b + 1]], return_inverse=True)
+        fixed = not bool(inv_mass[vert[b] : vert[b + 1]].any())
+        result.append(
+            Part(
+                path=f"/World/{prim_name(label, taken)}",
+                ids=ids,
+                faces=faces.reshape(-1, 3).astype(np.int32),
+                verts=(int(vert[b]), int(vert[b + 1])),
+                fixed=fixed,
+                color=linear(FIXED if fixed else PALETTE[b % len(PALETTE)]),
+            )
+        )
+    return result
+
+
+def prim_name(label: str, taken: set[str]) -> str:
+    """A valid prim name that is not in ``taken``, and from now on is."""
+    name = base = Tf.MakeValidIdentifier(label or "body")
+    n = 1
+    while name in taken:
+        name, n = f"{base}_{n}", n + 1
+    taken.add(name)
+    return name
+
+
+def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Layer:
+    """The layer of everything that does not change."""
+    model, x = sim.model, np.asarray(sim.positions(), dtype=np.float32)
+    rest = np.concatenate([body.x for body in sim.scene.bodies]).astype(np.float32)
+    layer = Sdf.Layer.CreateAnonymous(".usdc")
+    stage = Usd.Stage.Open(layer)
+    stage.SetTimeCodesPerSecond(sim.fps)
+    world = UsdGeom.Xform.Define(stage, "/World")
+    Usd.ModelAPI(world).SetKind(Kind.Tokens.assembly)
+    stage.SetDefaultPrim(world.GetPrim())
+    UsdGeom.Scope.Define(stage, "/World/Looks")
+    look = contact_look(stage)
+    physics = {}
+    for b, (part, label) in enumerate(zip(parts, model.labels, strict=True)):
+        xform = UsdGeom.Xform.Define(stage, part.path)
+        Usd.ModelAPI(xform).SetKind(Kind.Tokens.component)
+        note(xform, "label", Sdf.ValueTypeNames.String, label)
+        note(xform, "body", Sdf.ValueTypeNames.Int, b)
+        note(xform, "fixed", Sdf.ValueTypeNames.Bool, part.fixed)
+        add_surface(stage, part, x, look)
+        if tets:
+            add_tets(stage, part, b, model, rest, physics)
+    taken = {Sdf.Path(part.path).name for part in parts} | {"Looks", "view"}
+    for n, h in zip(model.plane_n.numpy(), model.plane_h.numpy(), strict=True):
+        add_plane(stage, f"/World/{prim_name('ground', taken)}", n, float(h), x, look)
+    if view is not None:
+        add_camera(stage, *view)
+    return layer
+
+
+def note(prim, name: str, kind, value) -> None:
+    """Set a constant under ``userProperties``."""
+    path = f"userProperties:{name}"
+    prim.GetPrim().CreateAttribute(path, kind, True, Sdf.VariabilityUniform).Set(value)
+
+
+def contact_look(stage) -> UsdShade.Material:
+    """A material that shows displayColor."""
+    material = UsdShade.Material.Define(stage, "/World/Looks/contact")
+    reader = UsdShade.Shader.Define(stage, "/World/Looks/contact/color")
+    reader.CreateIdAttr("UsdPrimvarReader_float3")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+    surface = UsdShade.Shader.Define(stage, "/World/Looks/contact/surface")
+    surface.CreateIdAttr("UsdPreviewSurface")
+    surface.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.6)
+    color = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    color.ConnectToSource(reader.CreateOutput("result", Sdf.ValueTypeNames.Float3))
+    out = surface.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+    material.CreateSurfaceOutput().ConnectToSource(out)
+    return material
+
+
+def add_mesh(stage, path: str, points: np.ndarray, faces: np.ndarray, look) -> UsdGeom.Mesh:
+    """A polygon mesh without subdivision."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateFaceVertexCountsAttr(np.full(len(faces), faces.shape[1], dtype=np.int32))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
+    points = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, dtype=np.float32))
+    mesh.CreatePointsAttr(points)
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(look)
+    return mesh
+
+
+def add_surface(stage, part: Part, x: np.ndarray, look) -> None:
+    """The surface of a body, with its primvars declared."""
+    mesh = add_mesh(stage, f"{part.path}/surface", x[part.ids], part.faces, look)
+    api, types = UsdGeom.PrimvarsAPI(mesh), Sdf.ValueTypeNames
+    n = len(part.ids)
+    defaults = (
+        ("displayColor", types.Color3fArray, np.tile(part.color, (n, 1))),
+        ("contact:pressure", types.FloatArray, np.zeros(n, dtype=np.float32)),
+        ("contact:penetration", types.FloatArray, np.zeros(n, dtype=np.float32)),
+        ("contact:partner", types.IntArray, np.full(n, -1, dtype=np.int32)),
+    )
+    for name, kind, value in defaults:
+        api.CreatePrimvar(name, kind, UsdGeom.Tokens.vertex).Set(value)
+
+
+def add_tets(stage, part: Part, b: int, model, rest: np.ndarray, physics: dict) -> None:
+    """The TetMesh of a body under the names of the USD deformable proposal, as bare tokens."""
+    first, end = part.verts
+    tet, tri = model.body_tet.numpy(), model.body_tri.numpy()
+    tets = model.tets.numpy().reshape(-1, 4)[tet[b] : tet[b + 1]] - first
+    tris = model.tris.numpy().reshape(-1, 3)[tri[b] : tri[b + 1]] - first
+    mesh = UsdGeom.TetMesh.Define(stage, f"{part.path}/sim")
+    mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
+    points = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(rest[first:end]))
+    mesh.CreatePointsAttr(points)
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    mesh.CreateTetVertexIndicesAttr(Vt.Vec4iArray.FromNumpy(np.ascontiguousarray(tets, np.int32)))
+    mesh.CreateSurfaceFaceVertexIndicesAttr(
+        Vt.Vec3iArray.FromNumpy(np.ascontiguousarray(tris, np.int32))
+    )
+    stage.GetPrimAtPath(part.path).AddAppliedSchema("PhysicsDeformableBodyAPI")
+    mesh.GetPrim().AddAppliedSchema("PhysicsVolumeDeformableSimAPI")
+    mesh.GetPrim().AddAppliedSchema("PhysicsCollisionAPI")
+    material = model.materials[b]
+    names = ("youngs_modulus", "poisson_ratio", "density")
+    values = tuple(getattr(material, name, None) for name in names)
+    if None not in values:
+        if values not in physics:
+            physics[values] = physics_material(stage, f"physics_{len(physics)}", *values)
+        api = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
+        api.Bind(physics[values], materialPurpose="physics")
+
+
+def physics_material(stage, name: str, youngs_modulus, poisson_ratio, density):
+    """A material of the USD deformable proposal."""
+    material = UsdShade.Material.Define(stage, f"/World/Looks/{name}")
+    UsdPhysics.MaterialAPI.Apply(material.GetPrim()).CreateDensityAttr(float(density))
+    material.GetPrim().AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
+    for key, value in ("youngsModulus", youngs_modulus), ("poissonsRatio", poisson_ratio):
+        attribute = material.GetPrim().CreateAttribute(f"physics:{key}", Sdf.ValueTypeNames.Float)
+        attribute.Set(float(value))
+    return material
+
+
+def add_plane(stage, path: str, n: np.ndarray, h: float, x: np.ndarray, look) -> None:
+    """A square on the boundary of the half-space n . x >= h, below the scene."""
+    n = n / np.linalg.norm(n)
+    u = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+    u /= np.linalg.norm(u)
+    v = np.cross(n, u)
+    low, high = x.min(0), x.max(0)
+    middle, size = 0.5 * (low + high), ROOM * float(np.linalg.norm(high - low))
+    middle = middle - (n @ middle - h) * n
+    points = [middle + size * (s * u + t * v) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    mesh = add_mesh(stage, path, np.array(points), np.array([[0, 1, 2, 3]], dtype=np.int32), look)
+    note(mesh, "normal", Sdf.ValueTypeNames.Vector3f, tuple(map(float, n)))
+    note(mesh, "offset", Sdf.ValueTypeNames.Float, h)
+    api = UsdGeom.PrimvarsAPI(mesh)
+    color = api.CreatePrimvar(
+        "displayColor", Sdf.ValueTypeNames.Color3fArray, UsdGeom.Tokens.constant
+    )
+    color.Set([tuple(map(float, linear(GROUND)))])
+
+
+def add_camera(stage, eye, target) -> None:
+    """A camera at ``eye`` that looks at ``target``."""
+    camera = UsdGeom.Camera.Define(stage, "/World/view")
+    note(camera, "eye", Sdf.ValueTypeNames.Point3d, tuple(map(float, eye)))
+    note(camera, "target", Sdf.ValueTypeNames.Point3d, tuple(map(float, target)))
+    back = np.subtract(eye, target).astype(float)
+    back /= np.linalg.norm(back)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.eye(3)[0]
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([[right, np.cross(back, right), back], np.zeros(3)])
+    matrix[3, :3] = eye
+    height = 2.0 * np.tan(np.radians(FOV) / 2.0) * 50.0
+    camera.CreateFocalLengthAttr(50.0)
+    camera.CreateVerticalApertureAttr(height)
+    camera.CreateHorizontalApertureAttr(height * 16.0 / 9.0)
+    camera.AddTransformOp().Set(Gf.Matrix4d(matrix.tolist()))

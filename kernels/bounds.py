@@ -12,6 +12,7 @@ from warp_contact.kernels.geometry import boxes_meet
 wp.set_module_options({"enable_backward": False})
 
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the body's box
+HUGE = wp.constant(1.0e5)  # cells along a body: more is not a body any longer
 GROW = wp.constant(1.0e-5)  # of an edge: a flat triangle's box must not vanish for a ray
 
 
@@ -60,6 +61,7 @@ def body_boxes(
 @wp.kernel
 def near_bodies(
     # in
+    cell: float,  # [m]
     bodies: wp.uint64,  # Bvh over the boxes, grouped by world
     world: wp.array[int],  # (n_body,)
     lower: wp.array[wp.vec3],  # (n_body,) [m]
@@ -86,6 +88,9 @@ def near_bodies(
                 near[m, k] = other
             count += 1
     n_near[m] = wp.min(count, capacity)
+    # What has exploded has no contacts, and no loop over its cells.
+    if not wp.length(upper[m] - lower[m]) < HUGE * cell:
+        n_near[m] = 0
     if count > capacity:
         wp.atomic_max(needed, 0, count)
 

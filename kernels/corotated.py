@@ -18,7 +18,7 @@ R comes from the closed form of Markley, which maximises tr(R^T F) over the rota
 z = (s1 + s2)(s2 + s3)(s3 + s1) with the signed singular values s. Where it vanishes R jumps
 (collapsed to a line, or mirrored), and a singular value decomposition picks one of the maximisers.
 
-Sources: Stomakhin et al. 2012, "Energetically consistent invertible elasticity", eq. 5;
+Sources: Stomakhin et al. 2012, "Energetically consistent invertible elasticity";
 Markley 1993, "Attitude determination using vector observations: a fast optimal matrix algorithm".
 """
 

@@ -115,6 +115,28 @@ def lines_closest(p: wp.vec3, q: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.vec2:
 
 
 @wp.func
+def projected_weights(x: wp.vec3, n: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
+    """Barycentric weights where the line x + t n meets the triangle's plane."""
+    whole = wp.dot(n, wp.cross(b - a, c - a))
+    if whole == 0.0:
+        return wp.vec3(1.0, 1.0, 1.0) / 3.0
+    wa = wp.dot(n, wp.cross(b - x, c - x)) / whole
+    wb = wp.dot(n, wp.cross(c - x, a - x)) / whole
+    return wp.vec3(wa, wb, 1.0 - wa - wb)
+
+
+@wp.func
+def projected_crossing(p: wp.vec3, q: wp.vec3, a: wp.vec3, b: wp.vec3, n: wp.vec3) -> wp.vec2:
+    """Parameters (s, u) where the lines pq and ab cross when seen along n."""
+    det = wp.dot(n, wp.cross(q - p, b - a))
+    if det == 0.0:
+        return wp.vec2(0.5, 0.5)
+    return wp.vec2(
+        wp.dot(n, wp.cross(a - p, b - a)) / det, wp.dot(n, wp.cross(a - p, q - p)) / det
+    )
+
+
+@wp.func
 def boxes_meet(alo: wp.vec3, ahi: wp.vec3, blo: wp.vec3, bhi: wp.vec3) -> bool:
     return (
         alo[0] <= bhi[0]

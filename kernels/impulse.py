@@ -2,11 +2,20 @@
 
 Contact c has vertices k with signed weights a_k (positive on the side that moves along n).
 
-    u = sum a_k v_k                          relative velocity              [m/s]
-    W = sum a_k^2 N_k / m_k                  N_k contacts share vertex k    [1/kg]
-    lambda <- max(0, lambda - (u . n) / W)   target u . n >= 0              [N s]
-    p_t <- p_t - u_t / W, |p_t| <= mu lambda                                [N s]
-    v_k += a_k (d lambda n + d p_t) / m_k    with the whole mass
+    u = sum a_k v_k                              relative velocity              [m/s]
+    W = sum a_k^2 N_k / m_k                      N_k contacts share vertex k    [1/kg]
+    lambda <- max(0, lambda - (u . n + c) / W)   c = max(0, g0 - rest) / h      [N s]
+    p_t <- p_t - u_t / W, |p_t| <= mu lambda                                    [N s]
+    v_k += a_k (d lambda n + d p_t) / m_k        with the whole mass
+
+The gap g0 at the start of the step may close to a resting gap at its end, not further: u . n >= -c.
+Without that hair's breadth the ends of an edge on a face would count as inside or outside by
+rounding, and stage 2 would lose the edge.
+
+Friction acts across the gap, a couple g0 n x p_t that would change the angular momentum. So u_t is
+taken relative to the turning of the other surface, u_t + sum b_k (n . v_k), and the vertices
+receive (b_k . p_t) n in return; b_j = g0 grad w_j over a triangle, and over two edges the same in
+the basis of their directions.
 
 Each contact sees the share m_k / N_k of a vertex, so the sweep cannot add kinetic energy
 (Tonge, Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly.
@@ -16,6 +25,9 @@ A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
+
+REST = wp.constant(1.0e-3)  # of an edge: the gap that is left between bodies at rest
+TURN = wp.constant(0.1)  # lever above which a thin or tilted triangle cannot take the couple
 
 
 @wp.func
@@ -27,6 +39,68 @@ def clamped(p: wp.vec3, bound: float) -> wp.vec3:
     return p
 
 
+@wp.func
+def gap(
+    c: int,
+    vert: wp.array2d[int],
+    coef: wp.array2d[float],
+    normal: wp.array[wp.vec3],
+    offset: wp.array[float],
+    on_plane: bool,
+    x: wp.array[wp.vec3],
+) -> float:
+    """Gap of a contact [m]; positions relative to one vertex keep float32 exact far out."""
+    origin = x[vert[c, 0]]
+    if on_plane:
+        return wp.dot(origin, normal[c]) - offset[c]
+    r = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(5):
+        r += coef[c, k] * (x[vert[c, k]] - origin)
+    return wp.dot(r, normal[c])
+
+
+@wp.func
+def couple(
+    k: int,
+    c: int,
+    g: float,
+    vert: wp.array2d[int],
+    n: wp.vec3,
+    x: wp.array[wp.vec3],
+) -> wp.vec3:
+    """b_k of a contact between bodies with the gap g [m]."""
+    p = x[vert[c, 0]]
+    q = x[vert[c, 1]]
+    a = x[vert[c, 2]]
+    b = x[vert[c, 3]]
+    if vert[c, 3] == vert[c, 4]:  # two edges
+        if k == 4:
+            return wp.vec3(0.0, 0.0, 0.0)
+        along = wp.cross(b - a, n)
+        other = q - p
+        if k >= 2:
+            along = wp.cross(q - p, n)
+            other = b - a
+        whole = wp.dot(along, other)
+        if whole == 0.0:
+            return wp.vec3(0.0, 0.0, 0.0)
+        if k == 0 or k == 2:
+            return -g / whole * along
+        return g / whole * along
+    if k < 2:
+        return wp.vec3(0.0, 0.0, 0.0)
+    d = x[vert[c, 4]]
+    whole = wp.dot(n, wp.cross(b - a, d - a))
+    if whole == 0.0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    across = a - b
+    if k == 2:
+        across = b - d
+    if k == 3:
+        across = d - a
+    return g / whole * wp.cross(across, n)
+
+
 @wp.kernel
 def begin_contacts(
     # in
@@ -34,10 +108,18 @@ def begin_contacts(
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
+    normal: wp.array[wp.vec3],  # (capacity,)
+    offset: wp.array[float],  # (capacity,) [m]
+    pair: wp.array[wp.vec2i],  # (capacity,)
     start: wp.array[int],  # (n_vert + 1,)
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    body_edge: wp.array[float],  # (n_body,) [m]
+    dt: wp.array[float],  # (1,) [s]
+    x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     # out
     weight: wp.array[float],  # (capacity,) [1/kg]
+    closing: wp.array[float],  # (capacity,) [m/s] approach that is allowed, < 0: overlap at x0
+    turn: wp.array2d[wp.vec3],  # (capacity, 5) b_k
     lam: wp.array[float],  # (capacity,) [N s]
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
 ):
@@ -51,26 +133,61 @@ def begin_contacts(
         i = vert[c, k]
         w += a * a * inv_mass[i] * float(start[i + 1] - start[i])
     weight[c] = w
+    on_plane = pair[c][1] >= body_edge.shape[0]
+    g = gap(c, vert, coef, normal, offset, on_plane, x0)
+    closing[c] = (g - REST * body_edge[pair[c][0]]) / dt[0]
+    for k in range(5):
+        turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
+    if w > 0.0 and not on_plane:
+        largest = float(0.0)
+        for k in range(5):
+            turn[c, k] = couple(k, c, g, vert, normal[c], x0)
+            largest = wp.max(largest, wp.length(turn[c, k]))
+        if largest > TURN:
+            for k in range(5):
+                turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
     if c >= first[0]:
         lam[c] = 0.0
         slip[c] = wp.vec3(0.0, 0.0, 0.0)
 
 
 @wp.kernel
+def next_sweep(
+    # out
+    again: wp.array[int],  # (1,) 0
+    # in, out
+    done: wp.array[int],  # (1,) sweeps so far
+):
+    """One thread: count a sweep."""
+    again[0] = 0
+    done[0] = done[0] + 1
+
+
+@wp.kernel
 def solve_contacts(
     # in
     mu: float,
+    tolerance: float,  # of an edge: approach in a step that needs another sweep
+    sweeps: int,  # at most
+    dt: wp.array[float],  # (1,) [s]
+    body_edge: wp.array[float],  # (n_body,) [m]
+    pair: wp.array[wp.vec2i],  # (capacity,)
+    done: wp.array[int],  # (1,) sweeps so far
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
     normal: wp.array[wp.vec3],  # (capacity,)
     weight: wp.array[float],  # (capacity,) [1/kg]
+    closing: wp.array[float],  # (capacity,) [m/s]
+    turn: wp.array2d[wp.vec3],  # (capacity, 5)
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # in, out
     lam: wp.array[float],  # (capacity,) [N s] accumulated normal impulse
     slip: wp.array[wp.vec3],  # (capacity,) [N s] accumulated friction impulse
     # out
     change: wp.array[wp.vec3],  # (capacity,) [N s] what this sweep adds
+    # out, added to
+    again: wp.array[int],  # (1,) 1 when another sweep is needed
 ):
     """One thread per contact: update its accumulated impulses."""
     c = wp.tid()
@@ -79,12 +196,18 @@ def solve_contacts(
     if weight[c] == 0.0:
         change[c] = wp.vec3(0.0, 0.0, 0.0)
         return
+    n = normal[c]
     u = wp.vec3(0.0, 0.0, 0.0)
     for k in range(5):
-        u += coef[c, k] * v[vert[c, k]]
-    n = normal[c]
+        w = v[vert[c, k]]
+        u += coef[c, k] * w
+        if mu > 0.0:
+            u += wp.dot(n, w) * turn[c, k]
     un = wp.dot(u, n)
-    new_lam = wp.max(lam[c] - un / weight[c], 0.0)
+    excess = un + wp.max(closing[c], 0.0)
+    if excess * dt[0] < -tolerance * body_edge[pair[c][0]] and done[0] < sweeps:
+        again[0] = 1
+    new_lam = wp.max(lam[c] - excess / weight[c], 0.0)
     new_slip = wp.vec3(0.0, 0.0, 0.0)
     if mu > 0.0:
         new_slip = clamped(slip[c] - (u - un * n) / weight[c], mu * new_lam)
@@ -99,6 +222,8 @@ def apply_impulses(
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
     coef: wp.array2d[float],  # (capacity, 5)
+    normal: wp.array[wp.vec3],  # (capacity,)
+    turn: wp.array2d[wp.vec3],  # (capacity, 5)
     change: wp.array[wp.vec3],  # (capacity,) [N s]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
     # in, out
@@ -112,7 +237,8 @@ def apply_impulses(
     p = wp.vec3(0.0, 0.0, 0.0)
     for e in range(start[i], start[i + 1]):
         c = entry[e] // 5
-        p += coef[c, entry[e] - 5 * c] * change[c]
+        k = entry[e] - 5 * c
+        p += coef[c, k] * change[c] + wp.dot(turn[c, k], change[c]) * normal[c]
     v[i] = v[i] + inv_mass[i] * p
     impulse[i] = impulse[i] + p
 

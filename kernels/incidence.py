@@ -1,11 +1,26 @@
 """The contacts at each vertex, as a list sorted by contact: sums over it repeat bit for bit.
 
-An entry is 5 c + k for vertex k of contact c. Entries of weight zero are left out.
+An entry is 5 c + k for vertex k of contact c. A vertex of weight zero is left out, unless friction
+may hand it a part of its couple.
 """
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def takes_part(
+    c: int, k: int, mu: float, vert: wp.array2d[int], coef: wp.array2d[float]
+) -> bool:
+    """Whether vertex k of contact c can receive an impulse; unused places repeat a vertex."""
+    if coef[c, k] != 0.0:
+        return True
+    if mu == 0.0 or k == 0 or vert[c, 2] == vert[c, 0]:
+        return False
+    if k == 1 or k == 4:
+        return vert[c, k] != vert[c, k - 1]
+    return True
 
 
 @wp.kernel
@@ -29,6 +44,7 @@ def total_contacts(
 @wp.kernel
 def count_entries(
     # in
+    mu: float,
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -40,13 +56,14 @@ def count_entries(
     if c >= n_contact[0]:
         return
     for k in range(5):
-        if coef[c, k] != 0.0:
+        if takes_part(c, k, mu, vert, coef):
             wp.atomic_add(count, vert[c, k], 1)
 
 
 @wp.kernel
 def fill_entries(
     # in
+    mu: float,
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -60,7 +77,7 @@ def fill_entries(
     if c >= n_contact[0]:
         return
     for k in range(5):
-        if coef[c, k] != 0.0:
+        if takes_part(c, k, mu, vert, coef):
             entry[wp.atomic_sub(start, vert[c, k], 1) - 1] = 5 * c + k
 
 

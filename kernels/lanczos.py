@@ -8,7 +8,7 @@ a, b. Sums run over chunks of vertices, then over the chunks of a body, in fixed
 double precision: runs repeat bit for bit. The coefficients of a body are a column of ``coef``,
 whose rows are b_{-1}^2, a_0, b_0^2, a_1, b_1^2, ... with b_{-1}^2 the square of the start vector.
 
-Source: Parlett 1998, "The symmetric eigenvalue problem", chapter 13.
+Source: Parlett 1998, "The symmetric eigenvalue problem".
 """
 
 import warp as wp
@@ -21,17 +21,17 @@ BREAKDOWN = wp.constant(wp.float64(1.0e-10))  # b^2 / a^2 that is rounding of fl
 
 
 @wp.kernel
-def add_noise(
+def restart(
     # in
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
     noise: wp.array[wp.vec3],  # (n_vert,)
     vert_body: wp.array[int],  # (n_vert,)
-    ritz: wp.array2d[float],  # (n_body, m), coefficients of the vectors in the sum
+    ritz: wp.array2d[float],  # (n_body, m), coefficients of the Ritz vector
     amount: float,  # [-]
     # in, out
     basis: wp.array2d[wp.vec3],  # (m + 1, n_vert)
 ):
-    """One thread per vertex: set row 0 to the sum of the first m rows, plus noise."""
+    """One thread per vertex: set row 0 to the Ritz vector, plus noise; fixed vertices to 0."""
     i = wp.tid()
     s = amount * noise[i]
     for j in range(ritz.shape[1]):

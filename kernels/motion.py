@@ -1,4 +1,4 @@
-"""Motion of the vertices: corner forces gathered, then symplectic Euler.
+"""Motion of the vertices: corner forces gathered, symplectic Euler, damping.
 
     f_i = sum of f_tet over the corners at vertex i        [N]
     v'  = v + h (f / m + g)                                [m/s]
@@ -6,6 +6,18 @@
 
 ``vt_corner`` lists the corners at a vertex as 4 tet + corner. They are added in the order of
 that list and never by atomics, so runs repeat bit for bit.
+
+Damping M dv/dt = -C v over h is done twice over h/2, each time in s stages of RKL1:
+
+    Y_0 = v,  Y_j = (2j-1)/j Y_{j-1} - (j-1)/j Y_{j-2} - (2j-1)/j (h/2) 2/(s^2+s) M^-1 C Y_{j-1}
+    Y_s = P_s(1 - h L/(s^2+s)) v                           P_s Legendre, L = M^-1 C
+
+so that v is multiplied by P_s^2, which is within [0, 1] for h L <= 2 (s^2 + s). One pass over h
+has a P_s of both signs: a mode whose velocity it turns round grows at any step of Euler, as
+v' = p (v - h w^2 x), x' = x + h v' is stable for 0 <= p <= 1 and h w <= 2, and unstable for p < 0.
+
+Source of RKL1: Meyer, Balsara, Aslam 2014, "A stabilized Runge-Kutta-Legendre method for
+explicit super-time-stepping of parabolic and mixed equations".
 """
 
 import warp as wp
@@ -92,11 +104,11 @@ def relax(
     # out
     y: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_j; may be last or before
 ):
-    """One thread per vertex: stage j of s of the damping."""
+    """One thread per vertex: stage j of s of the damping over half a step."""
     i = wp.tid()
     u = last[i]
     if inv_mass[i] > 0.0:
         back = float(1 - j) / float(j)
-        kick = dt[0] * float(4 * j - 2) / float(j * s * (s + 1)) * inv_mass[i]
+        kick = dt[0] * float(2 * j - 1) / float(j * s * (s + 1)) * inv_mass[i]
         u += back * (before[i] - u) - kick * corner_sum(i, vt_start, vt_corner, f_tet)
     y[i] = u

@@ -13,7 +13,7 @@ Energies are written in the Green strain E = (F^T F - I)/2, because I_C - 3 canc
 
     psi = mu (tr E (J - 1) - 4 tr cof E - 8 det E)/(J + 1) + l/2 (J - 1)^2,  J > 0
 
-Source: Smith, de Goes, Kim 2018, "Stable neo-Hookean flesh simulation", eq. 9 and section 3.4.
+Source: Smith, de Goes, Kim 2018, "Stable neo-Hookean flesh simulation".
 """
 
 import warp as wp

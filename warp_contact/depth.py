@@ -32,26 +32,26 @@ def hit_depths(model: Model, x: wp.array, work: Work) -> None:
     wp.capture_while(work.pending, fill_layer)
 
 
-def vertex_contacts(model: Model, x: wp.array, work: Work) -> None:
-    """Set the contact records of the hits."""
+def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Set the contact records of the hits at ``x`` in a step from ``x0``."""
     wp.launch(
         penetration.vertex_contacts,
         dim=work.capacity.contacts,
         inputs=[model.n_body, work.surface.id, model.tris, model.body_edge, model.vert_body]
-        + [model.on_surface, model.plane_n, model.plane_h, x, work.hit_start, work.hit_vert]
+        + [model.on_surface, model.plane_n, model.plane_h, x0, x, work.hit_start, work.hit_vert]
         + [work.hit_body, work.hit_layer, work.hit_depth, work.hit_dir],
         outputs=_records(work),
     )
     _count(work, work.none)
 
 
-def edge_contacts(model: Model, x: wp.array, work: Work) -> None:
-    """Append the contact records of the crossings."""
+def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Append the contact records of the crossings at ``x`` in a step from ``x0``."""
     wp.launch(
         crossing.edge_contacts,
         dim=model.n_edge,
         inputs=[work.surface.id, model.tris, model.edges, model.vert_body, model.body_edge]
-        + [work.hit_start, work.edge_start, work.edge_body, x],
+        + [work.hit_start, work.edge_start, work.edge_body, x0, x],
         outputs=_records(work),
     )
     _count(work, work.n_crossing)
@@ -62,12 +62,17 @@ def contacts_by_vertex(model: Model, work: Work) -> None:
     c = work.contacts
     m = work.capacity.contacts
     c.start.zero_()
-    wp.launch(incidence.count_entries, dim=m, inputs=[c.n, c.vert, c.coef], outputs=[c.start])
+    wp.launch(
+        incidence.count_entries,
+        dim=m,
+        inputs=[model.friction, c.n, c.vert, c.coef],
+        outputs=[c.start],
+    )
     wp.utils.array_scan(c.start, c.start, inclusive=True)
     wp.launch(
         incidence.fill_entries,
         dim=m,
-        inputs=[c.n, c.vert, c.coef],
+        inputs=[model.friction, c.n, c.vert, c.coef],
         outputs=[c.start, c.entry],
     )
     wp.launch(incidence.sort_entries, dim=model.n_vert, inputs=[c.start], outputs=[c.entry])

@@ -14,7 +14,7 @@ def near_bodies(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     wp.launch(
         bounds.near_bodies,
         dim=model.n_body,
-        inputs=[work.bodies.id, model.body_world, work.lower, work.upper],
+        inputs=[model.cell, work.bodies.id, model.body_world, work.lower, work.upper],
         outputs=[work.n_near, work.near, work.contacts.needed[3:4]],
     )
     launch_triangle_boxes(model, x0, x1, work.n_near, work.tri_lower, work.tri_upper)
@@ -74,7 +74,7 @@ def find_crossings(model: Model, x: wp.array, work: Work) -> None:
         crossing.count_crossings,
         dim=model.n_edge,
         inputs=[work.capacity.edge_slots, work.surface.id, model.tris, model.edges]
-        + [model.vert_body, work.n_near, work.near, work.lower, work.upper, x],
+        + [model.vert_body, model.body_edge, work.n_near, work.near, work.lower, work.upper, x],
         outputs=[work.edge_start, work.edge_body, work.contacts.needed[2:3]],
     )
     wp.utils.array_scan(work.edge_start, work.edge_start, inclusive=False)

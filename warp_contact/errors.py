@@ -1,5 +1,9 @@
-"""What a run can fail with."""
+"""What a run or a command can fail with."""
 
 
 class SimulationError(RuntimeError):
     """A run cannot go on, for example because its state is no longer finite."""
+
+
+class UsageError(ValueError):
+    """The command line asked for something that cannot be."""

@@ -7,31 +7,45 @@ from warp_contact.response import Penalty
 from warp_contact.types import Model
 from warp_contact.work import Work
 
-SWEEPS = 4  # of the impulses in a step
+SWEEPS = 32  # of the impulses, at most
+TOLERANCE = 1e-4  # of an edge: an approach in one step that is left to the closure
 
 
-def begin(model: Model, work: Work, first: wp.array) -> None:
-    """Set ``contacts.weight``; contacts from ``first``, shape (1,), on have no impulse yet."""
+def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
+    """Set what the sweeps need; contacts from ``first``, shape (1,), on have no impulse yet."""
     c = work.contacts
     wp.launch(
         impulse.begin_contacts,
         dim=work.capacity.contacts,
-        inputs=[first, c.n, c.vert, c.coef, c.start, model.inv_mass],
-        outputs=[c.weight, c.lam, c.slip],
+        inputs=[first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
+        + [model.inv_mass, model.body_edge, work.dt, x0],
+        outputs=[c.weight, c.closing, c.turn, c.lam, c.slip],
     )
 
 
 def exchange(model: Model, v: wp.array, work: Work) -> None:
     """Change ``v`` by normal impulses and friction until no contact approaches."""
     c = work.contacts
-    for _ in range(SWEEPS):
+
+    def sweep() -> None:
+        next_sweep(work)
         wp.launch(
             impulse.solve_contacts,
             dim=work.capacity.contacts,
-            inputs=[model.friction, c.n, c.vert, c.coef, c.normal, c.weight, v],
-            outputs=[c.lam, c.slip, c.change],
+            inputs=[model.friction, TOLERANCE, SWEEPS, work.dt, model.body_edge, c.pair, work.done]
+            + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.turn, v],
+            outputs=[c.lam, c.slip, c.change, work.again],
         )
         _apply(model, v, work)
+
+    work.done.zero_()
+    wp.copy(work.again, c.n)
+    wp.capture_while(work.again, sweep)
+
+
+def next_sweep(work: Work) -> None:
+    """Count a sweep over the contacts in ``done`` and clear ``again``."""
+    wp.launch(impulse.next_sweep, dim=1, inputs=[], outputs=[work.again, work.done])
 
 
 def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:
@@ -63,6 +77,6 @@ def _apply(model: Model, v: wp.array, work: Work) -> None:
     wp.launch(
         impulse.apply_impulses,
         dim=model.n_vert,
-        inputs=[c.start, c.entry, c.coef, c.change, model.inv_mass],
+        inputs=[c.start, c.entry, c.coef, c.normal, c.turn, c.change, model.inv_mass],
         outputs=[v, work.impulse],
     )

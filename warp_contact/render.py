@@ -14,7 +14,7 @@ from warp_contact.kernels import raycast
 from warp_contact.usd import frame_numbers, open_stage, read_note, read_planes, read_view
 from warp_contact.usd_scene import FOV, GROUND, PALETTE, linear
 
-CREASE = 40.0  # edges with a sharper angle than this stay sharp [degrees]
+CREASE = 60.0  # edges with a sharper angle than this stay sharp [degrees]
 DIRECTION = (0.55, -1.0, 0.5)  # from the scene toward an automatic camera
 MARGIN = 1.12  # room around the scene in an automatic view
 SUN = (-0.45, -0.55, 1.0)  # toward the sun
@@ -81,10 +81,7 @@ class Renderer:
         reach = float(np.linalg.norm(high - low)) if reach is None else reach
         x = wp.array(points, dtype=wp.vec3)
         mesh = wp.Mesh(points=x, indices=self.index)
-        normal = wp.empty(3 * len(self.tri), dtype=wp.vec3)
-        crease = float(np.cos(np.radians(CREASE)))
-        inputs = [self.tri, self.start, self.around, self.rest, self._areas(x), crease]
-        wp.launch(raycast.set_corner_normals, dim=len(normal), inputs=inputs, outputs=[normal])
+        normal = self.corner_normals(x)
         color = wp.array(np.asarray(colors, dtype=np.float32), dtype=wp.vec3)
         width, height = self.size
         picture = wp.empty(width * height, dtype=wp.vec3)
@@ -95,6 +92,14 @@ class Renderer:
             outputs=[picture],
         )
         return np.rint(255.0 * picture.numpy()).astype(np.uint8).reshape(height, width, 3)
+
+    def corner_normals(self, x: wp.array) -> wp.array:
+        """Normals of the corners of the triangles, shape (3 n_tri,)."""
+        normal = wp.empty(3 * len(self.tri), dtype=wp.vec3)
+        crease = float(np.cos(np.radians(CREASE)))
+        inputs = [self.tri, self.start, self.around, self.rest, self._areas(x), crease]
+        wp.launch(raycast.set_corner_normals, dim=len(normal), inputs=inputs, outputs=[normal])
+        return normal
 
     def _areas(self, x: wp.array) -> wp.array:
         """Area vectors of the triangles."""

@@ -25,8 +25,8 @@ def step(
     """
     if isinstance(response, Penalty):
         detect.near_bodies(model, state.x, state.x, work)
-        vertex_contacts(model, state.x, work)  # forces belong to the positions they act at
-        edge_contacts(model, state.x, work)
+        vertex_contacts(model, state.x, state.x, work)  # forces belong to the positions they act at
+        edge_contacts(model, state.x, state.x, work)
         predict(model, state, work, stages)
         impulse.push(model, state.v, work, response)
         drift(model, state, work, state.x)
@@ -34,16 +34,17 @@ def step(
         predict(model, state, work, stages)
         detect.near_bodies(model, state.x, work.x, work)
         wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
-        vertex_contacts(model, state.x, work)
+        vertex_contacts(model, state.x, state.x, work)
         move_surfaces(model, state, work, response)
         impulse.exchange(model, state.v, work)
     else:
         predict(model, state, work, stages)
         detect.near_bodies(model, state.x, work.x, work)
-        vertex_contacts(model, work.x, work)
+        vertex_contacts(model, state.x, work.x, work)
         impulse.exchange(model, state.v, work)
         drift(model, state, work, work.x)
-        edge_contacts(model, work.x, work, after=lambda: impulse.exchange(model, state.v, work))
+        edge_contacts(model, state.x, work.x, work)
+        wp.capture_if(work.n_crossing, lambda: impulse.exchange(model, state.v, work))
         drift(model, state, work, state.x)
         move_surfaces(model, state, work, response)  # what the step did not create
     impulse.record(model, work, unit)
@@ -71,26 +72,24 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
     )
 
 
-def vertex_contacts(model: Model, x: wp.array, work: Work) -> None:
+def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """Stages 1 and 2: contacts of vertices inside other bodies at the positions ``x``."""
     detect.find_inside(model, x, work)
     detect.list_hits(model, x, work)
     depth.hit_depths(model, x, work)
-    depth.vertex_contacts(model, x, work)
+    depth.vertex_contacts(model, x0, x, work)
     depth.contacts_by_vertex(model, work)
-    impulse.begin(model, work, work.none)
+    impulse.begin(model, x0, work, work.none)
 
 
-def edge_contacts(model: Model, x: wp.array, work: Work, after=None) -> None:
-    """Stages 1 and 2: contacts of edges across other bodies at ``x``, and what to do if any."""
+def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
     detect.find_crossings(model, x, work)
 
     def append() -> None:
-        depth.edge_contacts(model, x, work)
+        depth.edge_contacts(model, x0, x, work)
         depth.contacts_by_vertex(model, work)
-        impulse.begin(model, work, work.n_hit)
-        if after:
-            after()
+        impulse.begin(model, x0, work, work.n_hit)
 
     wp.capture_if(work.n_crossing, append)
 
@@ -104,9 +103,11 @@ def move_surfaces(model: Model, state: State, work: Work, response: ContactSurfa
         if response.search == "literal":
             surface.bisect(model, state.x, work, response)
         else:
-            surface.share_by_mass(model, work)
             surface.balance(model, state.x, work, response)
-            surface.close(model, state.x, work)
 
-    wp.capture_if(work.found, search)
+    def close() -> None:
+        surface.begin_closure(model, work)
+        wp.capture_if(work.found[1:2], search)
+        surface.close(model, state.x, work)
 
+    wp.capture_if(work.found[0:1], search if response.search == "literal" else close)

@@ -3,24 +3,27 @@
 import warp as wp
 
 from warp_contact.forces import internal_forces
+from warp_contact.impulse import next_sweep
 from warp_contact.kernels import closure, region, surface
 from warp_contact.response import ContactSurface
 from warp_contact.types import Model
 from warp_contact.work import Work
 
 TOLERANCE = 1e-5  # of an edge: float32 positions are no better in a scene of some hundred edges
+DEEP = 1e-3  # of an edge: an overlap at the start of the step, worth a search
 BOUND = 0.02  # of an edge: the largest move in a step; more would invert a body started deep inside
-PASSES = 4  # of the closure
+PASSES = 32  # of the closure, at most
 
 
 def leftover(model: Model, x: wp.array, work: Work) -> None:
-    """Set ``contacts.left`` at ``x``, and ``found`` where stage 4 has something to do."""
+    """Set ``contacts.left`` at ``x``, and ``found``: what stage 4 has to do."""
     c = work.contacts
     work.found.zero_()
     wp.launch(
-        region.leftover,
+        closure.leftover,
         dim=work.capacity.contacts,
-        inputs=[TOLERANCE, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, model.body_edge, x],
+        inputs=[TOLERANCE, DEEP, c.n, c.vert, c.coef, c.normal, c.offset, c.pair]
+        + [model.body_edge, c.closing, work.dt, x],
         outputs=[c.left, work.found],
     )
 
@@ -44,7 +47,7 @@ def begin_search(model: Model, x: wp.array, work: Work) -> None:
 
 
 def balance(model: Model, x: wp.array, work: Work, response: ContactSurface) -> None:
-    """Set ``fraction`` and ``contacts.share`` where the pressures balance; ``x`` is moved."""
+    """Set ``fraction`` and ``contacts.scale`` where the pressures balance; ``x`` is as before."""
     c = work.contacts
     around = [c.start, c.entry, c.coef, c.left, work.upper_mean, work.lower_mean, work.s]
     wp.launch(
@@ -68,10 +71,11 @@ def balance(model: Model, x: wp.array, work: Work, response: ContactSurface) -> 
         wp.launch(surface.meet, dim=model.n_vert, inputs=around, outputs=[work.fraction])
     _side_means(work)
     wp.launch(
-        closure.share_by_fraction,
+        closure.share_as_found,
         dim=work.capacity.contacts,
-        inputs=[c.n, c.left, work.upper_mean, work.lower_mean],
-        outputs=[c.share],
+        inputs=[DEEP, c.n, c.vert, c.coef, c.pair, c.start, model.inv_mass, model.body_edge]
+        + [c.closing, work.dt, work.upper_mean, work.lower_mean],
+        outputs=[c.scale],
     )
     wp.copy(x, work.x)
 
@@ -99,29 +103,40 @@ def bisect(model: Model, x: wp.array, work: Work, response: ContactSurface) -> N
     _displace(model, x, work)
 
 
+def begin_closure(model: Model, work: Work) -> None:
+    """Set ``contacts.slack``, ``scale`` and ``push`` of a closure that keeps centres of mass."""
+    c = work.contacts
+    wp.launch(
+        closure.begin_closure,
+        dim=work.capacity.contacts,
+        inputs=[BOUND, c.n, c.pair, model.body_edge, c.left],
+        outputs=[c.slack, c.scale, c.push],
+    )
+
+
 def close(model: Model, x: wp.array, work: Work) -> None:
     """Move ``x`` until every colliding vertex lies in the plane of its triangle."""
     c = work.contacts
-    for _ in range(PASSES):
+
+    def sweep() -> None:
+        next_sweep(work)
+        wp.launch(
+            closure.solve_gaps,
+            dim=work.capacity.contacts,
+            inputs=[TOLERANCE, model.n_body, PASSES, c.n, c.vert, c.coef, c.normal, c.offset]
+            + [c.pair, c.start, model.inv_mass, model.body_edge, c.slack, c.scale, x, work.done],
+            outputs=[c.push, c.change, work.again],
+        )
         wp.launch(
             closure.close_gaps,
             dim=model.n_vert,
-            inputs=[BOUND, c.start, c.entry, c.vert, c.coef, c.normal, c.left, c.share]
-            + [model.inv_mass, model.vert_body, model.body_edge, work.x],
+            inputs=[c.start, c.entry, c.coef, c.scale, c.change, model.inv_mass],
             outputs=[x],
         )
-        leftover(model, x, work)
 
-
-def share_by_mass(model: Model, work: Work) -> None:
-    """Set ``contacts.share`` so that the centre of mass of a contact stays."""
-    c = work.contacts
-    wp.launch(
-        closure.share_by_mass,
-        dim=work.capacity.contacts,
-        inputs=[c.n, c.vert, c.coef, model.inv_mass],
-        outputs=[c.share],
-    )
+    work.done.zero_()
+    wp.copy(work.again, c.n)
+    wp.capture_while(work.again, sweep)
 
 
 def _displace(model: Model, x: wp.array, work: Work) -> None:

@@ -146,11 +146,16 @@ class Contacts:
         start: first entry of each vertex in ``entry``, shape (n_vert + 1,)
         entry: contacts at each vertex as 5 contact + k, shape (5 capacity,)
         weight: sum of coef^2 N / m [1/kg], shape (capacity,)
+        closing: approach that is allowed [m/s], negative for an overlap at the start of the step,
+            shape (capacity,)
+        turn: lets friction across a gap keep the angular momentum [-], shape (capacity, 5)
         lam: normal impulse of the step [N s], shape (capacity,)
         slip: friction impulse of the step [N s], shape (capacity,)
         change: impulse of the last sweep [N s], shape (capacity,)
         left: overlap after the impulses [m], shape (capacity,)
-        share: part of it that the side along the normal takes, shape (capacity,)
+        slack: part of it that later steps resolve [m], shape (capacity,)
+        scale: of the mobilities of both sides in the closure, shape (capacity,)
+        push: of the closure [kg m], shape (capacity,)
     """
 
     n: wp.array
@@ -164,11 +169,15 @@ class Contacts:
     start: wp.array
     entry: wp.array
     weight: wp.array
+    closing: wp.array
+    turn: wp.array
     lam: wp.array
     slip: wp.array
     change: wp.array
     left: wp.array
-    share: wp.array
+    slack: wp.array
+    scale: wp.array
+    push: wp.array
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,8 @@ class UsdWriter:
         self.animate_tets = animate_tets and tets
         self.start = self.end = None
         self.parts = parts(sim.model)
+        counts = [end - first for first, end in (part.verts for part in self.parts)]
+        self.base = np.repeat([part.color for part in self.parts], counts, axis=0)
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
         self.grows = self.scale == 0.0
         frames = self.root.parent / "frames"
@@ -116,15 +118,14 @@ class UsdWriter:
         fields = self.sim.contact_fields()
         if self.grows:
             self.scale = max(self.scale, float(fields["pressure"].max(initial=0.0)))
+        color = heated(self.base, fields["pressure"] / (self.scale or 1.0))
         for part in self.parts:
             mesh, points = f"{part.path}/surface.", Vt.Vec3fArray.FromNumpy(x[part.ids])
             yield mesh + "points", points
             yield mesh + "extent", UsdGeom.PointBased.ComputeExtent(points)
             if v is not None:
                 yield mesh + "velocities", Vt.Vec3fArray.FromNumpy(v[part.ids])
-            pressure = fields["pressure"][part.ids]
-            color = heated(part.color, pressure / self.scale if self.scale > 0.0 else pressure)
-            yield mesh + "primvars:displayColor", Vt.Vec3fArray.FromNumpy(color)
+            yield mesh + "primvars:displayColor", Vt.Vec3fArray.FromNumpy(color[part.ids])
             for name in "pressure", "penetration":
                 value = Vt.FloatArray.FromNumpy(rounded(fields[name][part.ids]))
                 yield f"{mesh}primvars:contact:{name}", value

@@ -83,38 +83,45 @@ def point_based(stage: Usd.Stage, prim: Usd.Prim) -> list[str]:
     if moving and not times and len(frames) > 1:
         found.append(f"points has no samples for {len(frames)} frames")
     n = len(geometry.GetPointsAttr().Get(times[0] if times else DEFAULT) or ())
+    primvars = UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()
+    lengths, wanted = sizes(prim, n), []
+    for primvar in primvars:
+        size = lengths.get(primvar.GetInterpolation())
+        if size is not None and primvar.GetTypeName().isArray:
+            wanted.append((primvar, size))
     for time in times or [DEFAULT]:
         when = "" if time == DEFAULT else f" at frame {time:g}"
-        found += [line + when for line in at_time(geometry, time, n)]
+        found += [line + when for line in at_time(geometry, time, n, wanted)]
     return found + (tet_mesh(prim, n) if prim.IsA(UsdGeom.TetMesh) else mesh(prim, n))
 
 
-def at_time(geometry: UsdGeom.PointBased, time, n: int) -> list[str]:
-    """What is wrong at one time with ``n`` points, their extent and their primvars."""
+def at_time(geometry: UsdGeom.PointBased, time, n: int, primvars: list) -> list[str]:
+    """What is wrong at one time with ``n`` points, their extent, and primvars of given sizes."""
     points = geometry.GetPointsAttr().Get(time)
     if points is None or len(points) != n or n == 0:
         return [f"{0 if points is None else len(points)} points instead of {n or 'some'}"]
-    if not np.isfinite(points).all():
+    if not np.isfinite(np.asarray(points)).all():
         return ["points are not finite"]
     found, extent = [], geometry.GetExtentAttr().Get(time)
     expected = np.asarray(UsdGeom.PointBased.ComputeExtent(points))
     error = EXTENT_ERROR * float(np.abs(expected).max())
     if extent is None or np.abs(np.asarray(extent) - expected).max(initial=0.0) > error:
         found.append("extent is not that of the points")
-    for primvar in UsdGeom.PrimvarsAPI(geometry).GetPrimvarsWithAuthoredValues():
-        size = sizes(geometry, n).get(primvar.GetInterpolation())
-        value = primvar.ComputeFlattened(time)
-        if size is not None and hasattr(value, "__len__") and len(value) != size:
-            name = primvar.GetPrimvarName()
-            found.append(f"primvar {name} has {len(value)} values instead of {size}")
+    for primvar, size in primvars:
+        value = primvar.ComputeFlattened(time) if primvar.IsIndexed() else primvar.Get(time)
+        length = 0 if value is None else len(value)
+        if length != size * primvar.GetElementSize():
+            found.append(
+                f"primvar {primvar.GetPrimvarName()} has {length} values instead of {size}"
+            )
     return found
 
 
-def sizes(geometry: UsdGeom.PointBased, n: int) -> dict[str, int]:
+def sizes(prim: Usd.Prim, n: int) -> dict[str, int]:
     """Length that a primvar of each interpolation must have; those not listed are not checked."""
     result = {UsdGeom.Tokens.vertex: n, UsdGeom.Tokens.varying: n, UsdGeom.Tokens.constant: 1}
-    if geometry.GetPrim().IsA(UsdGeom.Mesh):
-        counts = UsdGeom.Mesh(geometry).GetFaceVertexCountsAttr().Get() or ()
+    if prim.IsA(UsdGeom.Mesh):
+        counts = UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get() or ()
         result[UsdGeom.Tokens.uniform] = len(counts)
         result[UsdGeom.Tokens.faceVarying] = int(np.sum(counts))
     return result

@@ -39,12 +39,18 @@ def linear(srgb: str) -> np.ndarray:
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
+WARM_COLOR, HOT_COLOR = linear(WARM), linear(HOT)
+
+
 def heated(base: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-    """Base colour blended over orange to red; the square root shows light contact too."""
+    """Base colours blended over orange to red by a pressure of 0 ... 1, shape (n, 3).
+
+    The square root lets light contact show too.
+    """
     s = np.sqrt(np.clip(pressure, 0.0, 1.0)).astype(np.float32)[:, None]
-    warm, hot = linear(WARM), linear(HOT)
     low, high = np.minimum(2.0 * s, 1.0), np.maximum(2.0 * s - 1.0, 0.0)
-    return np.ascontiguousarray(base + low * (warm - base) + high * (hot - warm), dtype=np.float32)
+    color = base + low * (WARM_COLOR - base) + high * (HOT_COLOR - WARM_COLOR)
+    return color.astype(np.float32)
 
 
 def parts(model) -> list[Part]:

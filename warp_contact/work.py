@@ -39,7 +39,9 @@ class Work:
         contacts: the contact records
         none: zero, shape (1,)
         n_hit, n_crossing: views of the last entries of ``hit_start`` and ``edge_start``
-        found: whether stage 4 has anything to do, shape (1,)
+        done: sweeps over the contacts so far, shape (1,)
+        again: whether another is needed, shape (1,)
+        found: whether stage 4 has anything to close and to search, shape (2,)
         s: displacement vectors [m], shape (n_vert,)
         area: areas of comparison [m^2], shape (n_vert,)
         before, now: tractions before stage 4 and at a trial [Pa], shape (n_vert,)
@@ -83,6 +85,8 @@ class Work:
     none: wp.array
     n_hit: wp.array
     n_crossing: wp.array
+    done: wp.array
+    again: wp.array
     found: wp.array
     s: wp.array
     area: wp.array
@@ -139,7 +143,9 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
         none=_ints(1),
         n_hit=hit_start[n:],
         n_crossing=edge_start[model.n_edge :],
-        found=_ints(1),
+        done=_ints(1),
+        again=_ints(1),
+        found=_ints(2),
         s=_vectors(n),
         area=_floats(n),
         before=_floats(n),
@@ -196,11 +202,15 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         start=_ints(n + 1),
         entry=_ints(5 * m),
         weight=_floats(m),
+        closing=_floats(m),
+        turn=wp.zeros((m, 5), dtype=wp.vec3),
         lam=_floats(m),
         slip=_vectors(m),
         change=_vectors(m),
         left=_floats(m),
-        share=_floats(m),
+        slack=_floats(m),
+        scale=wp.zeros(m, dtype=wp.vec2),
+        push=_floats(m),
     )
 
 

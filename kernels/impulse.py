@@ -122,6 +122,7 @@ def begin_contacts(
     turn: wp.array2d[wp.vec3],  # (capacity, 5) b_k
     lam: wp.array[float],  # (capacity,) [N s]
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    ahead: wp.array[wp.vec4],  # (capacity,) [N s]
 ):
     """One thread per contact: W, and no impulse yet on the new ones."""
     c = wp.tid()
@@ -149,6 +150,7 @@ def begin_contacts(
     if c >= first[0]:
         lam[c] = 0.0
         slip[c] = wp.vec3(0.0, 0.0, 0.0)
+        ahead[c] = wp.vec4(0.0, 0.0, 0.0, 0.0)
 
 
 @wp.kernel
@@ -181,9 +183,11 @@ def solve_contacts(
     closing: wp.array[float],  # (capacity,) [m/s]
     turn: wp.array2d[wp.vec3],  # (capacity, 5)
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    last: bool,  # leave the impulses where this sweep projects them
     # in, out
     lam: wp.array[float],  # (capacity,) [N s] accumulated normal impulse
     slip: wp.array[wp.vec3],  # (capacity,) [N s] accumulated friction impulse
+    ahead: wp.array[wp.vec4],  # (capacity,) [N s] extrapolated friction and normal impulse, in v
     # out
     change: wp.array[wp.vec3],  # (capacity,) [N s] what this sweep adds
     # out, added to
@@ -207,11 +211,21 @@ def solve_contacts(
     excess = un + wp.max(closing[c], 0.0)
     if excess * dt[0] < -tolerance * body_edge[pair[c][0]] and done[0] < sweeps:
         again[0] = 1
-    new_lam = wp.max(lam[c] - excess / weight[c], 0.0)
+    y = ahead[c]
+    yt = wp.vec3(y[0], y[1], y[2])
+    new_lam = wp.max(y[3] - excess / weight[c], 0.0)
     new_slip = wp.vec3(0.0, 0.0, 0.0)
     if mu > 0.0:
-        new_slip = clamped(slip[c] - (u - un * n) / weight[c], mu * new_lam)
-    change[c] = (new_lam - lam[c]) * n + new_slip - slip[c]
+        new_slip = clamped(yt - (u - un * n) / weight[c], mu * new_lam)
+    beta = float(0.0)
+    if not last:
+        beta = float(done[0] - 1) / float(done[0] + 2)
+    if (y[3] - new_lam) * (new_lam - lam[c]) > 0.0:
+        beta = 0.0
+    next_lam = new_lam + beta * (new_lam - lam[c])
+    next_slip = new_slip + beta * (new_slip - slip[c])
+    change[c] = (next_lam - y[3]) * n + next_slip - yt
+    ahead[c] = wp.vec4(next_slip[0], next_slip[1], next_slip[2], next_lam)
     lam[c] = new_lam
     slip[c] = new_slip
 

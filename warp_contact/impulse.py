@@ -19,7 +19,7 @@ def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
         dim=work.capacity.contacts,
         inputs=[first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
         + [model.inv_mass, model.body_edge, work.dt, x0],
-        outputs=[c.weight, c.closing, c.turn, c.lam, c.slip],
+        outputs=[c.weight, c.closing, c.turn, c.lam, c.slip, c.ahead],
     )
 
 
@@ -27,20 +27,21 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
     """Change ``v`` by normal impulses and friction until no contact approaches."""
     c = work.contacts
 
-    def sweep() -> None:
+    def sweep(last: bool = False) -> None:
         next_sweep(work)
         wp.launch(
             impulse.solve_contacts,
             dim=work.capacity.contacts,
             inputs=[model.friction, TOLERANCE, SWEEPS, work.dt, model.body_edge, c.pair, work.done]
-            + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.turn, v],
-            outputs=[c.lam, c.slip, c.change, work.again],
+            + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.turn, v, last],
+            outputs=[c.lam, c.slip, c.ahead, c.change, work.again],
         )
         _apply(model, v, work)
 
     work.done.zero_()
     wp.copy(work.again, c.n)
     wp.capture_while(work.again, sweep)
+    sweep(last=True)
 
 
 def next_sweep(work: Work) -> None:

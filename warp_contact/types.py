@@ -151,6 +151,7 @@ class Contacts:
         turn: lets friction across a gap keep the angular momentum [-], shape (capacity, 5)
         lam: normal impulse of the step [N s], shape (capacity,)
         slip: friction impulse of the step [N s], shape (capacity,)
+        ahead: extrapolated friction and normal impulse [N s], shape (capacity,)
         change: impulse of the last sweep [N s], shape (capacity,)
         left: overlap after the impulses [m], shape (capacity,)
         slack: part of it that later steps resolve [m], shape (capacity,)
@@ -173,6 +174,7 @@ class Contacts:
     turn: wp.array
     lam: wp.array
     slip: wp.array
+    ahead: wp.array
     change: wp.array
     left: wp.array
     slack: wp.array

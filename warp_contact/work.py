@@ -206,6 +206,7 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         turn=wp.zeros((m, 5), dtype=wp.vec3),
         lam=_floats(m),
         slip=_vectors(m),
+        ahead=wp.zeros(m, dtype=wp.vec4),
         change=_vectors(m),
         left=_floats(m),
         slack=_floats(m),

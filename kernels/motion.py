@@ -7,14 +7,14 @@
 ``vt_corner`` lists the corners at a vertex as 4 tet + corner. They are added in the order of
 that list and never by atomics, so runs repeat bit for bit.
 
-Damping M dv/dt = -C v over h is done twice over h/2, each time in s stages of RKL1:
+Damping M dv/dt = -C v over h, in s stages of RKL1 over 2 h and half way back:
 
-    Y_0 = v,  Y_j = (2j-1)/j Y_{j-1} - (j-1)/j Y_{j-2} - (2j-1)/j (h/2) 2/(s^2+s) M^-1 C Y_{j-1}
-    Y_s = P_s(1 - h L/(s^2+s)) v                           P_s Legendre, L = M^-1 C
+    Y_0 = v,  Y_j = (2j-1)/j Y_{j-1} - (j-1)/j Y_{j-2} - (2j-1)/j 4h/(s^2+s) M^-1 C Y_{j-1}
+    v' = (v + Y_s) / 2 = p v,  p = (1 + P_s(1 - 4 z/(s^2+s))) / 2,  z = h L, L of M^-1 C
 
-so that v is multiplied by P_s^2, which is within [0, 1] for h L <= 2 (s^2 + s). One pass over h
-has a P_s of both signs: a mode whose velocity it turns round grows at any step of Euler, as
-v' = p (v - h w^2 x), x' = x + h v' is stable for 0 <= p <= 1 and h w <= 2, and unstable for p < 0.
+with P_s Legendre. p = 1 - z + O(z^2), and 0 < p <= 1 for 2 z < s^2 + s. Both ends matter, as Euler is
+v' = p (v - h w^2 x), x' = x + h v': a mode with p < 0 grows at any step, and one with p = 0, of which
+P_s or its square have s, is frozen: contacts wind it up and it never relaxes.
 
 Source of RKL1: Meyer, Balsara, Aslam 2014, "A stabilized Runge-Kutta-Legendre method for
 explicit super-time-stepping of parabolic and mixed equations".
@@ -99,16 +99,19 @@ def relax(
     dt: wp.array[float],  # (1,) [s]
     j: int,
     s: int,
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_0
     last: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_{j-1}
     before: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_{j-2}
     # out
-    y: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_j; may be last or before
+    y: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_j, half way back for j = s; may be any of these
 ):
-    """One thread per vertex: stage j of s of the damping over half a step."""
+    """One thread per vertex: stage j of s of the damping."""
     i = wp.tid()
     u = last[i]
     if inv_mass[i] > 0.0:
         back = float(1 - j) / float(j)
-        kick = dt[0] * float(2 * j - 1) / float(j * s * (s + 1)) * inv_mass[i]
+        kick = 4.0 * dt[0] * float(2 * j - 1) / float(j * s * (s + 1)) * inv_mass[i]
         u += back * (before[i] - u) - kick * corner_sum(i, vt_start, vt_corner, f_tet)
+        if j == s:
+            u = 0.5 * (u + v[i])
     y[i] = u

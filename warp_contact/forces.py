@@ -65,36 +65,34 @@ def damp(
     v: wp.array,
     dt: wp.array,
     f_tet: wp.array,
-    w: wp.array,
+    scratch: tuple[wp.array, wp.array],
     stages: int,
 ) -> None:
     """Damp ``v`` [m/s] over ``dt`` [s], shape (1,), at fixed positions ``x`` [m].
 
-    Solves M dv/dt = -C(x) v twice over dt/2 in ``stages`` stages of ``motion.relax``: stable for
-    dt lambda_max(M^-1 C) <= 2 (stages^2 + stages), see ``stages_for``. Momentum is kept, no mode
-    grows or turns round, fixed vertices keep their velocity. Scratch: ``f_tet`` (n_tet, 4) and
-    ``w`` (n_vert,). Without a damped body nothing is launched.
+    Solves M dv/dt = -C(x) v in ``stages`` stages of ``motion.relax``: stable for
+    2 dt lambda_max(M^-1 C) <= stages^2 + stages, see ``stages_for``. Momentum is kept, no mode
+    grows, turns round or freezes, fixed vertices keep their velocity. Scratch: ``f_tet``
+    (n_tet, 4) and two arrays (n_vert,). Without a damped body nothing is launched.
     """
     if stages == 0 or not any(e.damped for e in model.elements):
         return
     if not all(e.damped for e in model.elements):
         f_tet.zero_()
-    for _half in range(2):
-        last, before = v, v
-        for j in range(1, stages + 1):
-            apply_damping(model, x, last, f_tet)
-            # A stage may overwrite Y_{j-1} or Y_{j-2}: it reads the entry of its own vertex only.
-            out = v if j == stages or last is w else w
-            wp.launch(
-                motion.relax,
-                dim=model.n_vert,
-                inputs=[model.vt_start, model.vt_corner, f_tet, model.inv_mass, dt, j, stages],
-                outputs=[last, before, out],
-            )
-            last, before = out, last
+    last, before = v, v
+    for j in range(1, stages + 1):
+        apply_damping(model, x, last, f_tet)
+        out = v if j == stages else scratch[j % 2]
+        wp.launch(
+            motion.relax,
+            dim=model.n_vert,
+            inputs=[model.vt_start, model.vt_corner, f_tet, model.inv_mass, dt, j, stages, v],
+            outputs=[last, before, out],
+        )
+        last, before = out, last
 
 
 def stages_for(rate: float, dt: float) -> int:
     """Return the stages that ``damp`` needs for lambda_max ``rate`` [1/s] and step ``dt`` [s]."""
-    z = 0.5 * MARGIN * rate * dt
-    return math.ceil(0.5 * (math.sqrt(1.0 + 4.0 * z) - 1.0))
+    z = MARGIN * rate * dt
+    return math.ceil(0.5 * (math.sqrt(1.0 + 8.0 * z) - 1.0))

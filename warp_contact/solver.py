@@ -61,7 +61,7 @@ def predict(model: Model, state: State, work: Work, stages: int) -> None:
         outputs=[work.x, state.v],
     )
     if stages > 0:
-        damp(model, state.x, state.v, work.dt, work.f_tet, work.v, stages)
+        damp(model, state.x, state.v, work.dt, work.f_tet, (work.v, work.s), stages)
         drift(model, state, work, work.x)
 
 

@@ -1,4 +1,7 @@
-"""Boxes around bodies and triangles over a step, and the bodies whose boxes meet.
+"""Boxes around bodies and triangles over a step, and the bodies that may touch.
+
+Two bodies may touch when their boxes meet in a box B and either surface has a triangle there. Where
+only one has, the other still may hold all of B: a body enclosed by another.
 
 A box holds the start and the predicted end of a step: stage 2 asks at the prediction for vertices
 and, once these are resolved, somewhere in between for edges. Minimum and maximum do not depend on
@@ -8,6 +11,7 @@ the order of their arguments, so atomics repeat bit for bit.
 import warp as wp
 
 from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.surface_query import holds
 
 wp.set_module_options({"enable_backward": False})
 
@@ -128,3 +132,43 @@ def triangle_boxes(
     g += GROW * body_edge[body]
     lower[t] = lo - wp.vec3(g, g, g)
     upper[t] = hi + wp.vec3(g, g, g)
+
+
+@wp.func
+def has_triangle(surface: wp.uint64, body: int, lo: wp.vec3, hi: wp.vec3) -> bool:
+    t = int(0)
+    query = wp.bvh_query_aabb(surface, lo, hi, wp.bvh_get_group_root(surface, body))
+    return wp.bvh_query_next(query, t)
+
+
+@wp.kernel
+def prune_near(
+    # in
+    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    lower: wp.array[wp.vec3],  # (n_body,) [m]
+    upper: wp.array[wp.vec3],  # (n_body,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # in, out
+    n_near: wp.array[int],  # (n_body,)
+    near: wp.array2d[int],  # (n_body, capacity)
+):
+    """One thread per body: keep the near bodies that may touch it; both sides decide alike."""
+    m = wp.tid()
+    count = int(0)
+    for k in range(n_near[m]):
+        other = near[m, k]
+        lo = wp.max(lower[m], lower[other])
+        hi = wp.min(upper[m], upper[other])
+        own_there = has_triangle(surface, m, lo, hi)
+        other_there = has_triangle(surface, other, lo, hi)
+        keep = own_there and other_there
+        middle = 0.5 * (lo + hi)
+        if own_there and not other_there:
+            keep = holds(surface, other, tris, x, middle)
+        if other_there and not own_there:
+            keep = holds(surface, m, tris, x, middle)
+        if keep:
+            near[m, count] = other
+            count += 1
+    n_near[m] = count

@@ -23,33 +23,9 @@ from warp_contact.kernels.geometry import (
     projected_weights,
 )
 from warp_contact.kernels.penetration import SLIP
-from warp_contact.kernels.surface_query import Hit, closest_hit, first_hit, hit_point
+from warp_contact.kernels.surface_query import Hit, closest_hit, first_crossing, hit_point
 
 wp.set_module_options({"enable_backward": False})
-
-
-@wp.struct
-class Piece:
-    enter: Hit
-    leave: Hit  # leave.tri is -1 when the edge does not cross
-
-
-@wp.func
-def inner_piece(
-    surface: wp.uint64,
-    body: int,
-    tris: wp.array[wp.vec3i],
-    x: wp.array[wp.vec3],
-    p: wp.vec3,
-    q: wp.vec3,
-) -> Piece:
-    """First piece of pq inside the body."""
-    piece = Piece()
-    piece.leave.tri = -1
-    piece.enter = first_hit(surface, body, tris, x, p, q - p, 0.0, -1.0)
-    if piece.enter.tri >= 0:
-        piece.leave = first_hit(surface, body, tris, x, p, q - p, piece.enter.t, 1.0)
-    return piece
 
 
 @wp.func
@@ -137,10 +113,9 @@ def edge_contact(
 ) -> EdgeContact:
     """The contact of the edge pq with a body, if it has one."""
     none = EdgeContact()
-    enter = first_hit(surface, body, tris, x, p, q - p, 0.0, -1.0)
-    leave = first_hit(surface, body, tris, x, p, q - p, 0.0, 1.0)
-    if enter.tri >= 0 and leave.tri >= 0 and leave.t < enter.t:
-        leave = first_hit(surface, body, tris, x, p, q - p, enter.t, 1.0)
+    crossing = first_crossing(surface, body, tris, x, p, q - p)
+    enter = crossing.enter
+    leave = crossing.leave
     if enter.tri >= 0 and leave.tri >= 0:
         t = 0.5 * (enter.t + leave.t)
         middle = p + t * (q - p)

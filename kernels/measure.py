@@ -6,9 +6,8 @@ ends outside by the distance of the middle of its inner piece to that surface.
 
 import warp as wp
 
-from warp_contact.kernels.crossing import inner_piece
 from warp_contact.kernels.geometry import tet_weights
-from warp_contact.kernels.surface_query import closest_hit
+from warp_contact.kernels.surface_query import closest_hit, first_crossing
 
 wp.set_module_options({"enable_backward": False})
 
@@ -101,8 +100,8 @@ def edge_overlaps(
     query = wp.bvh_query_aabb(bodies, wp.min(p, q), wp.max(p, q), root)
     while wp.bvh_query_next(query, body):
         if body != own:
-            piece = inner_piece(surface, body, tris, x, p, q)
-            if piece.leave.tri >= 0:
+            piece = first_crossing(surface, body, tris, x, p, q - p)
+            if piece.enter.tri >= 0 and piece.leave.tri >= 0:
                 middle = p + 0.5 * (piece.enter.t + piece.leave.t) * (q - p)
                 hit = closest_hit(surface, body, tris, x, middle, 0.1 * body_edge[body])
                 if hit.t > overlap[e]:

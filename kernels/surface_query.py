@@ -1,6 +1,7 @@
 """Questions to the surface of one body, answered through the grouped triangle Bvh.
 
     first_hit      the first crossing of a segment that enters (or leaves) the body
+    first_crossing both, from one query
     leaving_hit    where a ray from inside leaves the body
     closest_hit    the closest point of the surface
     hit_normal     the outward normal at a hit: of the face, blended over smooth edges only
@@ -65,6 +66,76 @@ def first_hit(
                     best.t = h[0]
                     best.w = weights3(h)
     return best
+
+
+@wp.struct
+class Crossing:
+    enter: Hit
+    leave: Hit
+
+
+@wp.func
+def first_crossing(
+    surface: wp.uint64,
+    body: int,
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+    u: wp.vec3,
+) -> Crossing:
+    """First entering crossing of p + t u, 0 < t <= 1, and the first leaving one after it."""
+    out = Crossing()
+    out.enter.tri = -1
+    out.enter.t = NONE
+    out.leave.tri = -1
+    out.leave.t = NONE
+    k = int(0)
+    q = p + u
+    root = wp.bvh_get_group_root(surface, body)
+    query = wp.bvh_query_aabb(surface, wp.min(p, q), wp.max(p, q), root)
+    while wp.bvh_query_next(query, k):
+        a = x[tris[k][0]]
+        b = x[tris[k][1]]
+        c = x[tris[k][2]]
+        h = segment_hit(p, u, a, b, c)
+        if h[0] > 0.0 and h[0] <= 1.0:
+            if wp.dot(u, wp.cross(b - a, c - a)) < 0.0:
+                if h[0] < out.enter.t or (h[0] == out.enter.t and k < out.enter.tri):
+                    out.enter.tri = k
+                    out.enter.t = h[0]
+                    out.enter.w = weights3(h)
+            elif h[0] < out.leave.t or (h[0] == out.leave.t and k < out.leave.tri):
+                out.leave.tri = k
+                out.leave.t = h[0]
+                out.leave.w = weights3(h)
+    if out.enter.tri >= 0 and out.leave.tri >= 0 and out.leave.t < out.enter.t:
+        out.leave = first_hit(surface, body, tris, x, p, u, out.enter.t, 1.0)
+    return out
+
+
+@wp.func
+def holds(
+    surface: wp.uint64,
+    body: int,
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+) -> bool:
+    """Whether p is inside the body: the first triangle above it faces up."""
+    inside = bool(False)
+    nearest = float(NONE)
+    k = int(0)
+    up = wp.vec3(0.0, 0.0, 1.0)
+    query = wp.bvh_query_ray(surface, p, up, wp.bvh_get_group_root(surface, body))
+    while wp.bvh_query_next(query, k, nearest):
+        a = x[tris[k][0]]
+        b = x[tris[k][1]]
+        c = x[tris[k][2]]
+        h = segment_hit(p, up, a, b, c)
+        if h[0] >= 0.0 and h[0] < nearest:
+            nearest = h[0]
+            inside = wp.dot(up, wp.cross(b - a, c - a)) > 0.0
+    return inside
 
 
 @wp.func

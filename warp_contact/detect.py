@@ -8,7 +8,7 @@ from warp_contact.work import Work, launch_body_boxes, launch_triangle_boxes
 
 
 def near_bodies(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
-    """Set the boxes of the bodies from ``x0`` to ``x1``, ``near`` and the triangle Bvh."""
+    """Set ``near``, the bodies that may touch from ``x0`` to ``x1``, and the triangle Bvh."""
     launch_body_boxes(model, x0, x1, work.lower, work.upper)
     work.bodies.refit()
     wp.launch(
@@ -19,6 +19,12 @@ def near_bodies(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     )
     launch_triangle_boxes(model, x0, x1, work.n_near, work.tri_lower, work.tri_upper)
     work.surface.refit()
+    wp.launch(
+        bounds.prune_near,
+        dim=model.n_body,
+        inputs=[work.surface.id, model.tris, work.lower, work.upper, x1],
+        outputs=[work.n_near, work.near],
+    )
 
 
 def find_inside(model: Model, x: wp.array, work: Work) -> None:

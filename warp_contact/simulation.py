@@ -10,7 +10,7 @@ import warp as wp
 from warp_contact import solver
 from warp_contact.assemble import assemble
 from warp_contact.errors import SimulationError
-from warp_contact.forces import stages_for
+from warp_contact.forces import MARGIN, stages_for
 from warp_contact.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.response import ContactSurface, Penalty
@@ -125,7 +125,8 @@ class Simulation:
                     continue
                 self._check_finite()
                 after = self._spectra()
-                if self._wanted is not None or dt * after[0] <= UNSTABLE:
+                steady = self._wanted is not None or dt * after[0] <= UNSTABLE
+                if steady and stages_for(after[1] / MARGIN, dt) <= stages_for(rate, dt):
                     break
                 omega, rate = max(1.2 * omega, after[0]), max(rate, after[1])
                 self._restore()

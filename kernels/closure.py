@@ -9,6 +9,10 @@ Mobilities are 1 / m: the centre of mass of a contact stays where it is. Where t
 of the two sides are scaled so that the sides share the overlap as the search did. Eq. (1) alone
 leaves 25 to 38 % of an overlap between a vertex and the middle of a triangle.
 
+A move p n of a pair that slides by u_t changes the angular momentum by p n x u_t. It is handed back
+to the velocities as the couple of impulse.py, dv_k = (b_k . p u_t) n / m_k; where the search has
+scaled the mobilities, momentum is not kept by design and nothing is handed back.
+
 slack is what exceeds the largest move of a step, less the resting gap of the impulses: a body that
 starts deep inside another would be inverted by a full correction.
 """
@@ -39,6 +43,7 @@ def leftover(
     left: wp.array[float],  # (capacity,) [m]
     # out, added to
     found: wp.array[int],  # (2,) 1 when any overlap is to be closed, and to be searched
+    deep_found: wp.array[int],  # (1,) 1 when any has been to be searched since the frame began
 ):
     """One thread per contact: the overlap at x."""
     c = wp.tid()
@@ -54,6 +59,7 @@ def leftover(
         found[0] = 1
     if d > deep * edge and -closing[c] * dt[0] > deep * edge:
         found[1] = 1
+        deep_found[0] = 1
 
 
 @wp.kernel
@@ -196,3 +202,51 @@ def close_gaps(
             side = scale[c][1]
         p += coef[c, k] * side * change[c]
     x[i] = x[i] + inv_mass[i] * p
+
+
+@wp.kernel
+def couples(
+    # in
+    n_contact: wp.array[int],  # (1,)
+    vert: wp.array2d[int],  # (capacity, 5)
+    coef: wp.array2d[float],  # (capacity, 5)
+    scale: wp.array[wp.vec2],  # (capacity,)
+    push: wp.array[float],  # (capacity,) [kg m]
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    # out
+    change: wp.array[wp.vec3],  # (capacity,) [kg m^2/s] p u
+):
+    """One thread per contact: the couple that its push leaves behind."""
+    c = wp.tid()
+    if c >= n_contact[0]:
+        return
+    change[c] = wp.vec3(0.0, 0.0, 0.0)
+    if push[c] == 0.0 or scale[c][0] != 1.0:
+        return
+    u = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(5):
+        u += coef[c, k] * v[vert[c, k]]
+    change[c] = push[c] * u
+
+
+@wp.kernel
+def hand_back(
+    # in
+    start: wp.array[int],  # (n_vert + 1,)
+    entry: wp.array[int],  # (5 capacity,)
+    normal: wp.array[wp.vec3],  # (capacity,)
+    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
+    change: wp.array[wp.vec3],  # (capacity,) [kg m^2/s]
+    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    # in, out
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+):
+    """One thread per vertex: gather its part of the couples."""
+    i = wp.tid()
+    if start[i] == start[i + 1] or inv_mass[i] == 0.0:
+        return
+    p = wp.vec3(0.0, 0.0, 0.0)
+    for e in range(start[i], start[i + 1]):
+        c = entry[e] // 5
+        p += wp.dot(turn[c, entry[e] - 5 * c], change[c]) * normal[c]
+    v[i] = v[i] + inv_mass[i] * p

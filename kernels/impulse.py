@@ -13,8 +13,8 @@ Without that hair's breadth the ends of an edge on a face would count as inside 
 rounding, and stage 2 would lose the edge.
 
 Friction acts across the gap, a couple g0 n x p_t that would change the angular momentum. So u_t is
-taken relative to the turning of the other surface, u_t + sum b_k (n . v_k), and the vertices
-receive (b_k . p_t) n in return; b_j = g0 grad w_j over a triangle, and over two edges the same in
+taken relative to the turning of the other surface, u_t + g0 sum b_k (n . v_k), and the vertices
+receive g0 (b_k . p_t) n in return; b_j = grad w_j over a triangle, and over two edges the same in
 the basis of their directions.
 
 Each contact sees the share m_k / N_k of a vertex, so the sweep cannot add kinetic energy
@@ -27,7 +27,8 @@ import warp as wp
 wp.set_module_options({"enable_backward": False})
 
 REST = wp.constant(1.0e-3)  # of an edge: the gap that is left between bodies at rest
-TURN = wp.constant(0.1)  # lever above which a thin or tilted triangle cannot take the couple
+TURN = wp.constant(0.1)  # gap times gradient above which a surface cannot take the couple
+STEEP = wp.constant(8.0)  # gradient times edge of a triangle too thin or too tilted for it
 
 
 @wp.func
@@ -60,15 +61,14 @@ def gap(
 
 
 @wp.func
-def couple(
+def gradient(
     k: int,
     c: int,
-    g: float,
     vert: wp.array2d[int],
     n: wp.vec3,
     x: wp.array[wp.vec3],
 ) -> wp.vec3:
-    """b_k of a contact between bodies with the gap g [m]."""
+    """b_k of a contact between bodies [1/m]."""
     p = x[vert[c, 0]]
     q = x[vert[c, 1]]
     a = x[vert[c, 2]]
@@ -85,8 +85,8 @@ def couple(
         if whole == 0.0:
             return wp.vec3(0.0, 0.0, 0.0)
         if k == 0 or k == 2:
-            return -g / whole * along
-        return g / whole * along
+            return -along / whole
+        return along / whole
     if k < 2:
         return wp.vec3(0.0, 0.0, 0.0)
     d = x[vert[c, 4]]
@@ -98,7 +98,7 @@ def couple(
         across = b - d
     if k == 3:
         across = d - a
-    return g / whole * wp.cross(across, n)
+    return wp.cross(across, n) / whole
 
 
 @wp.kernel
@@ -119,7 +119,8 @@ def begin_contacts(
     # out
     weight: wp.array[float],  # (capacity,) [1/kg]
     closing: wp.array[float],  # (capacity,) [m/s] approach that is allowed, < 0: overlap at x0
-    turn: wp.array2d[wp.vec3],  # (capacity, 5) b_k
+    open: wp.array[float],  # (capacity,) [m] g0, 0 where no surface can take the couple
+    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m] b_k
     lam: wp.array[float],  # (capacity,) [N s]
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
     ahead: wp.array[wp.vec4],  # (capacity,) [N s]
@@ -137,16 +138,18 @@ def begin_contacts(
     on_plane = pair[c][1] >= body_edge.shape[0]
     g = gap(c, vert, coef, normal, offset, on_plane, x0)
     closing[c] = (g - REST * body_edge[pair[c][0]]) / dt[0]
+    open[c] = g
+    largest = float(0.0)
     for k in range(5):
         turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
-    if w > 0.0 and not on_plane:
-        largest = float(0.0)
-        for k in range(5):
-            turn[c, k] = couple(k, c, g, vert, normal[c], x0)
+        if w > 0.0 and not on_plane:
+            turn[c, k] = gradient(k, c, vert, normal[c], x0)
             largest = wp.max(largest, wp.length(turn[c, k]))
-        if largest > TURN:
-            for k in range(5):
-                turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
+    if largest * body_edge[pair[c][0]] > STEEP:
+        for k in range(5):
+            turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
+    if largest * wp.abs(g) > TURN or on_plane:
+        open[c] = 0.0
     if c >= first[0]:
         lam[c] = 0.0
         slip[c] = wp.vec3(0.0, 0.0, 0.0)
@@ -181,7 +184,8 @@ def solve_contacts(
     normal: wp.array[wp.vec3],  # (capacity,)
     weight: wp.array[float],  # (capacity,) [1/kg]
     closing: wp.array[float],  # (capacity,) [m/s]
-    turn: wp.array2d[wp.vec3],  # (capacity, 5)
+    open: wp.array[float],  # (capacity,) [m]
+    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     last: bool,  # leave the impulses where this sweep projects them
     # in, out
@@ -206,7 +210,7 @@ def solve_contacts(
         w = v[vert[c, k]]
         u += coef[c, k] * w
         if mu > 0.0:
-            u += wp.dot(n, w) * turn[c, k]
+            u += open[c] * wp.dot(n, w) * turn[c, k]
     un = wp.dot(u, n)
     excess = un + wp.max(closing[c], 0.0)
     if excess * dt[0] < -tolerance * body_edge[pair[c][0]] and done[0] < sweeps:
@@ -237,7 +241,8 @@ def apply_impulses(
     entry: wp.array[int],  # (5 capacity,)
     coef: wp.array2d[float],  # (capacity, 5)
     normal: wp.array[wp.vec3],  # (capacity,)
-    turn: wp.array2d[wp.vec3],  # (capacity, 5)
+    open: wp.array[float],  # (capacity,) [m]
+    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
     change: wp.array[wp.vec3],  # (capacity,) [N s]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
     # in, out
@@ -252,7 +257,7 @@ def apply_impulses(
     for e in range(start[i], start[i + 1]):
         c = entry[e] // 5
         k = entry[e] - 5 * c
-        p += coef[c, k] * change[c] + wp.dot(turn[c, k], change[c]) * normal[c]
+        p += coef[c, k] * change[c] + open[c] * wp.dot(turn[c, k], change[c]) * normal[c]
     v[i] = v[i] + inv_mass[i] * p
     impulse[i] = impulse[i] + p
 

@@ -1,7 +1,7 @@
 """The contacts at each vertex, as a list sorted by contact: sums over it repeat bit for bit.
 
-An entry is 5 c + k for vertex k of contact c. A vertex of weight zero is left out, unless friction
-may hand it a part of its couple.
+An entry is 5 c + k for vertex k of contact c. A vertex of weight zero has one too: it may receive a
+part of a couple.
 """
 
 import warp as wp
@@ -10,13 +10,11 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def takes_part(
-    c: int, k: int, mu: float, vert: wp.array2d[int], coef: wp.array2d[float]
-) -> bool:
+def takes_part(c: int, k: int, vert: wp.array2d[int], coef: wp.array2d[float]) -> bool:
     """Whether vertex k of contact c can receive an impulse; unused places repeat a vertex."""
     if coef[c, k] != 0.0:
         return True
-    if mu == 0.0 or k == 0 or vert[c, 2] == vert[c, 0]:
+    if k == 0 or vert[c, 2] == vert[c, 0]:
         return False
     if k == 1 or k == 4:
         return vert[c, k] != vert[c, k - 1]
@@ -44,7 +42,6 @@ def total_contacts(
 @wp.kernel
 def count_entries(
     # in
-    mu: float,
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -56,14 +53,13 @@ def count_entries(
     if c >= n_contact[0]:
         return
     for k in range(5):
-        if takes_part(c, k, mu, vert, coef):
+        if takes_part(c, k, vert, coef):
             wp.atomic_add(count, vert[c, k], 1)
 
 
 @wp.kernel
 def fill_entries(
     # in
-    mu: float,
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -77,7 +73,7 @@ def fill_entries(
     if c >= n_contact[0]:
         return
     for k in range(5):
-        if takes_part(c, k, mu, vert, coef):
+        if takes_part(c, k, vert, coef):
             entry[wp.atomic_sub(start, vert[c, k], 1) - 1] = 5 * c + k
 
 

@@ -127,3 +127,75 @@ def dense():
         return np.stack([_at_vertices(launch, model, x, u).ravel() for u in unit], axis=1)
 
     return matrix
+
+
+def _stages(scene, capacity=None, dt=1e-3) -> tuple:
+    from warp_contact.assemble import assemble
+    from warp_contact.types import Capacity
+    from warp_contact.work import allocate_work
+
+    model, state = assemble(scene)
+    work = allocate_work(model, state, capacity or Capacity(contacts=2048, slots=4))
+    work.dt.fill_(dt)
+    return model, state, work
+
+
+@pytest.fixture
+def stages():
+    """Model, State and Work of ``stages(scene, capacity=..., dt=...)``, to run single stages."""
+    return _stages
+
+
+def _find_contacts(model, work, x0, x=None, edges=False) -> SimpleNamespace:
+    from warp_contact import detect, solver
+
+    x = x0 if x is None else x
+    detect.near_bodies(model, x0, x, work)
+    solver.vertex_contacts(model, x0, x, work)
+    if edges:
+        solver.edge_contacts(model, x0, x, work)
+    assert not work.contacts.needed.numpy().any()
+    return _records(work)
+
+
+def _records(work) -> SimpleNamespace:
+    c = work.contacts
+    n = int(c.n.numpy()[0])
+    arrays = {k: a.numpy()[:n] for k, a in vars(c).items() if k not in ("n", "needed", "entry")}
+    return SimpleNamespace(n=n, **{**arrays, "start": c.start.numpy()})
+
+
+@pytest.fixture
+def find_contacts():
+    """Run stages 1 and 2: ``find_contacts(model, work, x0, x, edges=False)``; the records."""
+    return _find_contacts
+
+
+@pytest.fixture
+def records():
+    """Contact records as NumPy arrays, ``records(work)``."""
+    return _records
+
+
+@pytest.fixture
+def turned(rng):
+    """Random unit quaternions (x, y, z, w), ``turned()``."""
+
+    def quaternion() -> np.ndarray:
+        q = rng.normal(size=4)
+        return q / np.linalg.norm(q)
+
+    return quaternion
+
+
+@pytest.fixture
+def jittered(rng):
+    """A box whose vertices are shifted at random by a part of a cell, ``jittered(size, cells)``."""
+    from warp_contact import TetMesh, box
+
+    def mesh(size: float, cells: int, part: float = 0.15) -> TetMesh:
+        regular = box(size, cells)
+        shift = rng.uniform(-part, part, regular.vertices.shape) * size / cells
+        return TetMesh(regular.vertices + shift, regular.tets)
+
+    return mesh

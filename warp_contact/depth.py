@@ -62,17 +62,12 @@ def contacts_by_vertex(model: Model, work: Work) -> None:
     c = work.contacts
     m = work.capacity.contacts
     c.start.zero_()
-    wp.launch(
-        incidence.count_entries,
-        dim=m,
-        inputs=[model.friction, c.n, c.vert, c.coef],
-        outputs=[c.start],
-    )
+    wp.launch(incidence.count_entries, dim=m, inputs=[c.n, c.vert, c.coef], outputs=[c.start])
     wp.utils.array_scan(c.start, c.start, inclusive=True)
     wp.launch(
         incidence.fill_entries,
         dim=m,
-        inputs=[model.friction, c.n, c.vert, c.coef],
+        inputs=[c.n, c.vert, c.coef],
         outputs=[c.start, c.entry],
     )
     wp.launch(incidence.sort_entries, dim=model.n_vert, inputs=[c.start], outputs=[c.entry])

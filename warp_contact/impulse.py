@@ -19,7 +19,7 @@ def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
         dim=work.capacity.contacts,
         inputs=[first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
         + [model.inv_mass, model.body_edge, work.dt, x0],
-        outputs=[c.weight, c.closing, c.turn, c.lam, c.slip, c.ahead],
+        outputs=[c.weight, c.closing, c.open, c.turn, c.lam, c.slip, c.ahead],
     )
 
 
@@ -33,7 +33,8 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
             impulse.solve_contacts,
             dim=work.capacity.contacts,
             inputs=[model.friction, TOLERANCE, SWEEPS, work.dt, model.body_edge, c.pair, work.done]
-            + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.turn, v, last],
+            + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.open, c.turn]
+            + [v, last],
             outputs=[c.lam, c.slip, c.ahead, c.change, work.again],
         )
         _apply(model, v, work)
@@ -78,6 +79,7 @@ def _apply(model: Model, v: wp.array, work: Work) -> None:
     wp.launch(
         impulse.apply_impulses,
         dim=model.n_vert,
-        inputs=[c.start, c.entry, c.coef, c.normal, c.turn, c.change, model.inv_mass],
+        inputs=[c.start, c.entry, c.coef, c.normal, c.open, c.turn, c.change]
+        + [model.inv_mass],
         outputs=[v, work.impulse],
     )

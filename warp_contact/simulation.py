@@ -83,7 +83,8 @@ class Simulation:
         self._unit = UNIT * (mobile if mobile > 0.0 else 1.0)
         self._thickness = float(self.model.body_thickness.numpy().min())
         self._largest_inv_mass = float(inv_mass.max())
-        self._graphs: dict[int, wp.Graph] = {}
+        self._graphs: dict[tuple[int, bool], wp.Graph] = {}
+        self._search: bool | None = None  # whether some overlap was not created by a step
         self._rates: tuple[float, float] | None = None
 
     @property
@@ -115,6 +116,8 @@ class Simulation:
         that came, is repeated from its start: nothing is lost.
         """
         with wp.ScopedDevice(self.device):
+            if self._search is None:
+                self._search = solver.overlaps(self.model, self.state, self._work)
             wp.copy(self._saved.x, self.state.x)
             wp.copy(self._saved.v, self.state.v)
             omega, rate = self._rates or self._spectra()
@@ -131,6 +134,7 @@ class Simulation:
                 omega, rate = max(1.2 * omega, after[0]), max(rate, after[1])
                 self._restore()
             self._rates = after
+            self._search = self._search and bool(self._work.deep_found.numpy()[0])
             self.frame += 1
 
     def positions(self, body: Body | int | None = None) -> np.ndarray:
@@ -199,6 +203,7 @@ class Simulation:
         work.pair_key.fill_(-1)
         work.pair_total.zero_()
         work.contacts.needed.zero_()
+        work.deep_found.zero_()
         work.bodies.rebuild()
         graph = self._graph(stages)
         for _ in range(n):
@@ -219,12 +224,13 @@ class Simulation:
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured step with so many stages of damping."""
-        if stages not in self._graphs:
-            arguments = self.model, self.state, self._work, self.response, stages, self._unit
+        key = stages, self._search
+        if key not in self._graphs:
+            arguments = self.model, self.state, self._work, self.response, *key, self._unit
             with wp.ScopedCapture() as capture:
                 solver.step(*arguments)
-            self._graphs[stages] = capture.graph
-        return self._graphs[stages]
+            self._graphs[key] = capture.graph
+        return self._graphs[key]
 
     def _grow(self) -> bool:
         """Enlarge the buffers that the frame outgrew; True if there were any."""

@@ -16,12 +16,14 @@ def step(
     work: Work,
     response: ContactSurface | Penalty,
     stages: int,
+    search: bool,
     unit: float,
 ) -> None:
     """Advance ``state`` in place by ``work.dt``, symplectic Euler.
 
     No read-back and no allocation, so that a caller may capture it. ``stages`` are those of the
-    damping, ``unit`` [N s] is the resolution of the recorded contact impulses.
+    damping, ``search`` says whether there may be overlaps that no step created, ``unit`` [N s] is
+    the resolution of the recorded contact impulses.
     """
     if isinstance(response, Penalty):
         detect.near_bodies(model, state.x, state.x, work)
@@ -35,7 +37,7 @@ def step(
         detect.near_bodies(model, state.x, work.x, work)
         wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
         vertex_contacts(model, state.x, state.x, work)
-        move_surfaces(model, state, work, response)
+        move_surfaces(model, state, work, response, search)
         impulse.exchange(model, state.v, work)
     else:
         predict(model, state, work, stages)
@@ -46,8 +48,17 @@ def step(
         edge_contacts(model, state.x, work.x, work)
         wp.capture_if(work.n_crossing, lambda: impulse.exchange(model, state.v, work))
         drift(model, state, work, state.x)
-        move_surfaces(model, state, work, response)  # what the step did not create
+        move_surfaces(model, state, work, response, search)  # what the step did not create
     impulse.record(model, work, unit)
+
+
+def overlaps(model: Model, state: State, work: Work) -> bool:
+    """Whether bodies overlap by more than a search is worth; reads back, so not for a step."""
+    work.dt.fill_(1.0)
+    detect.near_bodies(model, state.x, state.x, work)
+    vertex_contacts(model, state.x, state.x, work)
+    surface.leftover(model, state.x, work)
+    return bool(work.found.numpy()[1])
 
 
 def predict(model: Model, state: State, work: Work, stages: int) -> None:
@@ -94,11 +105,13 @@ def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     wp.capture_if(work.n_crossing, append)
 
 
-def move_surfaces(model: Model, state: State, work: Work, response: ContactSurface) -> None:
-    """Stages 3 and 4: displace the surfaces onto a common one; velocities do not change."""
+def move_surfaces(
+    model: Model, state: State, work: Work, response: ContactSurface, search: bool
+) -> None:
+    """Stages 3 and 4: displace the surfaces onto a common one; no motion comes of it."""
     surface.leftover(model, state.x, work)
 
-    def search() -> None:
+    def find_surface() -> None:
         surface.begin_search(model, state.x, work)
         if response.search == "literal":
             surface.bisect(model, state.x, work, response)
@@ -107,7 +120,8 @@ def move_surfaces(model: Model, state: State, work: Work, response: ContactSurfa
 
     def close() -> None:
         surface.begin_closure(model, work)
-        wp.capture_if(work.found[1:2], search)
-        surface.close(model, state.x, work)
+        if search:
+            wp.capture_if(work.found[1:2], find_surface)
+        surface.close(model, state.x, state.v, work)
 
-    wp.capture_if(work.found[0:1], search if response.search == "literal" else close)
+    wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else close)

@@ -9,7 +9,7 @@ from warp_contact.response import ContactSurface
 from warp_contact.types import Model
 from warp_contact.work import Work
 
-TOLERANCE = 1e-5  # of an edge: float32 positions are no better in a scene of some hundred edges
+TOLERANCE = 1e-4  # of an edge: less overlap is left to the resting gap of the impulses
 DEEP = 1e-3  # of an edge: an overlap at the start of the step, worth a search
 BOUND = 0.02  # of an edge: the largest move in a step; more would invert a body started deep inside
 PASSES = 32  # of the closure, at most
@@ -24,7 +24,7 @@ def leftover(model: Model, x: wp.array, work: Work) -> None:
         dim=work.capacity.contacts,
         inputs=[TOLERANCE, DEEP, c.n, c.vert, c.coef, c.normal, c.offset, c.pair]
         + [model.body_edge, c.closing, work.dt, x],
-        outputs=[c.left, work.found],
+        outputs=[c.left, work.found, work.deep_found],
     )
 
 
@@ -114,8 +114,11 @@ def begin_closure(model: Model, work: Work) -> None:
     )
 
 
-def close(model: Model, x: wp.array, work: Work) -> None:
-    """Move ``x`` until every colliding vertex lies in the plane of its triangle."""
+def close(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
+    """Move ``x`` until every colliding vertex lies in the plane of its triangle.
+
+    ``v`` changes only by what keeps the angular momentum.
+    """
     c = work.contacts
 
     def sweep() -> None:
@@ -137,6 +140,18 @@ def close(model: Model, x: wp.array, work: Work) -> None:
     work.done.zero_()
     wp.copy(work.again, c.n)
     wp.capture_while(work.again, sweep)
+    wp.launch(
+        closure.couples,
+        dim=work.capacity.contacts,
+        inputs=[c.n, c.vert, c.coef, c.scale, c.push, v],
+        outputs=[c.change],
+    )
+    wp.launch(
+        closure.hand_back,
+        dim=model.n_vert,
+        inputs=[c.start, c.entry, c.normal, c.turn, c.change, model.inv_mass],
+        outputs=[v],
+    )
 
 
 def _displace(model: Model, x: wp.array, work: Work) -> None:

@@ -148,7 +148,8 @@ class Contacts:
         weight: sum of coef^2 N / m [1/kg], shape (capacity,)
         closing: approach that is allowed [m/s], negative for an overlap at the start of the step,
             shape (capacity,)
-        turn: lets friction across a gap keep the angular momentum [-], shape (capacity, 5)
+        open: gap at the start of the step [m], shape (capacity,)
+        turn: how couples are handed to the vertices [1/m], shape (capacity, 5)
         lam: normal impulse of the step [N s], shape (capacity,)
         slip: friction impulse of the step [N s], shape (capacity,)
         ahead: extrapolated friction and normal impulse [N s], shape (capacity,)
@@ -171,6 +172,7 @@ class Contacts:
     entry: wp.array
     weight: wp.array
     closing: wp.array
+    open: wp.array
     turn: wp.array
     lam: wp.array
     slip: wp.array

@@ -42,6 +42,7 @@ class Work:
         done: sweeps over the contacts so far, shape (1,)
         again: whether another is needed, shape (1,)
         found: whether stage 4 has anything to close and to search, shape (2,)
+        deep_found: whether it had anything to search since the frame began, shape (1,)
         s: displacement vectors [m], shape (n_vert,)
         area: areas of comparison [m^2], shape (n_vert,)
         before, now: tractions before stage 4 and at a trial [Pa], shape (n_vert,)
@@ -88,6 +89,7 @@ class Work:
     done: wp.array
     again: wp.array
     found: wp.array
+    deep_found: wp.array
     s: wp.array
     area: wp.array
     before: wp.array
@@ -146,6 +148,7 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
         done=_ints(1),
         again=_ints(1),
         found=_ints(2),
+        deep_found=_ints(1),
         s=_vectors(n),
         area=_floats(n),
         before=_floats(n),
@@ -203,6 +206,7 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         entry=_ints(5 * m),
         weight=_floats(m),
         closing=_floats(m),
+        open=_floats(m),
         turn=wp.zeros((m, 5), dtype=wp.vec3),
         lam=_floats(m),
         slip=_vectors(m),

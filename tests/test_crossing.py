@@ -1,0 +1,86 @@
+"""Edges across other bodies: the ridge against ridge that the paper leaves out."""
+
+import numpy as np
+import pytest
+
+from warp_contact import NeoHookean, Scene, TetMesh, box
+from warp_contact.scene import rotation_matrix
+
+RUBBER = NeoHookean(1e5, 0.3, 1000.0)
+DEPTH = 0.02
+
+
+def roof(axis: int, top: float, up: float) -> TetMesh:
+    """A tet with one edge along an axis at the height ``top``, the rest of it behind that edge.
+
+    Blunter than 60 degrees: out of a sharper ridge the way is shorter through a side.
+    """
+    other = 1 - axis
+    x = np.zeros((4, 3))
+    x[:2, axis] = -0.5, 0.5
+    x[2:, other] = -0.5, 0.5
+    x[:2, 2] = top
+    x[2:, 2] = top - up
+    return TetMesh(x, [[0, 1, 2, 3]])
+
+
+def crossed(rng, turn, shift) -> Scene:
+    """Two tets whose edges at z = 0 cross at a right angle, one DEPTH into the other."""
+    scene = Scene()
+    off = rng.uniform(-0.2, 0.2, 2)
+    rotate = rotation_matrix(turn)
+    for mesh, place in (
+        (roof(0, 0.0, 0.4), (0.0, 0.0, 0.0)),
+        (roof(1, 0.0, -0.4), (*off, -DEPTH)),
+    ):
+        scene.add_body(mesh, RUBBER, rotate @ place + shift, turn)
+    return scene
+
+
+def test_two_crossed_tets_make_a_contact_of_their_edges(rng, stages, find_contacts, turned):
+    turn, shift = turned(), rng.uniform(-1.0, 1.0, 3)
+    model, state, work = stages(crossed(rng, turn, shift))
+    c = find_contacts(model, work, state.x, edges=True)
+    assert c.n == 2  # the edge of each
+    up = rotation_matrix(turn)[:, 2]
+    for k, sign in ((0, -1.0), (1, 1.0)):
+        assert c.pair[k].tolist() == [k, 1 - k]
+        # Coordinates of order 1 in float32.
+        np.testing.assert_allclose(c.normal[k], sign * up, atol=1e-5)
+        assert c.depth[k] == pytest.approx(DEPTH, abs=1e-6)
+        assert sorted(c.vert[k, :2]) == [4 * k, 4 * k + 1]
+        assert set(c.vert[k, 2:]) == {4 * (1 - k), 4 * (1 - k) + 1}
+        gap = c.coef[k] @ (state.x.numpy()[c.vert[k]] @ c.normal[k])
+        assert gap == pytest.approx(-DEPTH, abs=1e-6)
+
+
+def test_crossed_beams_are_pushed_apart_along_the_common_perpendicular(
+    rng, stages, find_contacts, turned
+):
+    scene = Scene()
+    turn = turned()
+    rotate = rotation_matrix(turn)
+    radius = 0.1 * np.sqrt(2.0)  # an eighth of a turn about the axis: ridges up and down
+    half = np.pi / 8.0
+    for axis, z in ((0, 0.0), (1, 2.0 * radius - DEPTH)):
+        size = [0.2, 0.2, 0.2]
+        size[axis] = 1.0
+        eighth = np.sin(half) * np.eye(4)[axis] + np.cos(half) * np.eye(4)[3]
+        beam = box(size, 1).transformed(rotation_matrix(eighth))
+        scene.add_body(beam, RUBBER, rotate @ (0.0, 0.0, z), turn)
+    model, state, work = stages(scene)
+    c = find_contacts(model, work, state.x, edges=True)
+    assert c.n >= 2
+    for k in range(c.n):
+        sign = 1.0 if c.pair[k, 0] == 1 else -1.0
+        np.testing.assert_allclose(c.normal[k], sign * rotate[:, 2], atol=1e-5)  # float32
+        assert c.depth[k] == pytest.approx(DEPTH, abs=1e-6)
+
+
+def test_edges_that_pass_each_other_make_no_contact(rng, stages, find_contacts, turned):
+    scene = crossed(rng, (0.0, 0.0, 0.0, 1.0), np.zeros(3))
+    model, state, work = stages(scene)
+    x = state.x.numpy()
+    x[4:, 2] += 1.001 * DEPTH
+    state.x.assign(x)
+    assert find_contacts(model, work, state.x, edges=True).n == 0

@@ -1,0 +1,175 @@
+"""detect.py: vertices inside tets by hashing against brute force, and buffers that grow."""
+
+import numpy as np
+import pytest
+
+from warp_contact import NeoHookean, Scene, Simulation, TetMesh, box, detect
+from warp_contact.types import Capacity
+from warp_contact.work import allocate_work
+
+RUBBER = NeoHookean(1e5, 0.3, 1000.0)
+# float32 weights of the tets below (edges of 0.1 to 1, coordinates below 10) are good to this;
+# pairs that are closer to a face are left to rounding.
+DOUBT = 1e-4
+
+
+def weights(x: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Barycentric weights of all points in all tets, shape (n, m, 4)."""
+    inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+    w = np.einsum("mij,nmj->nmi", inverse, x[:, None] - corners[None, :, 0])
+    return np.concatenate([1.0 - w.sum(axis=2, keepdims=True), w], axis=2)
+
+
+def brute_force(scene: Scene, x: np.ndarray) -> tuple[set, set]:
+    """(vertex, body) pairs that are certain, and those that are near a face."""
+    sure, doubtful = set(), set()
+    first = np.cumsum([0] + [len(b.x) for b in scene.bodies])
+    for body, i0, i1 in zip(scene.bodies, first, first[1:], strict=False):
+        margin = weights(x, x[i0:i1][body.mesh.tets]).min(axis=2).max(axis=1)
+        for other, j0, j1 in zip(scene.bodies, first, first[1:], strict=False):
+            if other is not body and other.world == body.world:
+                for i in range(j0, j1):
+                    if margin[i] > DOUBT:
+                        sure.add((i, body.index))
+                    elif margin[i] > -DOUBT:
+                        doubtful.add((i, body.index))
+    return sure, doubtful
+
+
+def found(model, state, work) -> list[tuple[int, int]]:
+    detect.near_bodies(model, state.x, state.x, work)
+    detect.find_inside(model, state.x, work)
+    slots = work.inside.numpy().reshape(model.n_vert, -1)
+    return [(int(i), int(slots[i, k])) for i, k in zip(*np.nonzero(slots >= 0), strict=True)]
+
+
+@pytest.mark.parametrize("worlds", [1, 3])
+def test_hashing_finds_what_brute_force_finds(rng, stages, jittered, turned, worlds):
+    scene = Scene()
+    for k in range(7):
+        mesh = jittered(rng.uniform(0.3, 1.0), int(rng.integers(1, 5)))
+        # Around the origin, and once more far from it.
+        place = rng.uniform(-0.4, 0.4, 3) + (k % 2) * np.array([-5.0, -7.0, 3.0])
+        scene.add_body(mesh, RUBBER, place, turned(), world=int(rng.integers(worlds)))
+    model, state, work = stages(scene, Capacity(slots=8))
+    pairs = found(model, state, work)
+    sure, doubtful = brute_force(scene, state.x.numpy().astype(float))
+    assert len(pairs) == len(set(pairs))
+    assert sure <= set(pairs) <= sure | doubtful
+    assert not work.contacts.needed.numpy().any()
+
+
+def test_several_bodies_at_one_vertex_are_all_found(stages, turned):
+    scene = Scene()
+    for k in range(5):
+        scene.add_body(box(1.0 + 0.1 * k, 2), RUBBER, (-3.0, 2.0, -1.0), turned())
+    model, state, work = stages(scene, Capacity(slots=4))
+    centre = 13  # of the 27 vertices of each box
+    pairs = set(found(model, state, work))
+    for a in range(5):
+        assert {(27 * a + centre, b) for b in range(5) if b != a} <= pairs
+
+
+def test_points_on_faces_edges_and_corners_are_inside_once(stages):
+    lattice = box(2.0, 2)  # vertices, edges and faces of the tets at whole numbers
+    at = [(0.0, 0.5, 0.25), (0.0, 0.5, 0.5), (-1.0, 0.5, 0.25), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)]
+    away = np.array([[3.0, 0.0, 0.0], [3.0, 1.0, 0.0], [3.0, 0.0, 1.0]])
+    scene = Scene()
+    scene.add_body(lattice, RUBBER)
+    for point in at:
+        scene.add_body(TetMesh([point, *away], [[0, 1, 2, 3]]), RUBBER, world=0)
+    model, state, work = stages(scene, Capacity(slots=8))
+    pairs = found(model, state, work)
+    for k in range(len(at)):
+        assert pairs.count((27 + 4 * k, 0)) == 1
+
+
+def test_bodies_of_different_worlds_are_never_near(stages, jittered):
+    scene = Scene()
+    mesh = jittered(1.0, 2)
+    for world in (0, 1, 1, 2):
+        scene.add_body(mesh, RUBBER, (0.1 * world, 0.0, 0.0), world=world)
+    model, state, work = stages(scene)
+    detect.near_bodies(model, state.x, state.x, work)
+    np.testing.assert_array_equal(work.n_near.numpy(), [0, 1, 1, 0])
+    assert work.near.numpy()[1, 0] == 2 and work.near.numpy()[2, 0] == 1
+
+
+def test_near_bodies_have_boxes_that_meet_and_none_that_touches_is_missed(rng, stages, turned):
+    scene = Scene()
+    for _ in range(19):
+        scene.add_body(box(0.5, 1), RUBBER, rng.uniform(-1.0, 1.0, 3), turned())
+    scene.add_body(box(0.01, 1), RUBBER, scene.bodies[0].x.mean(axis=0))  # enclosed
+    model, state, work = stages(scene, Capacity(near=20))
+    detect.near_bodies(model, state.x, state.x, work)
+    x = state.x.numpy().reshape(20, 8, 3)
+    lo, hi = x.min(axis=1), x.max(axis=1)
+    meet = ((lo[:, None] <= hi) & (lo <= hi[:, None])).all(axis=2) & ~np.eye(20, dtype=bool)
+    near = np.zeros((20, 20), dtype=bool)
+    for body, n in enumerate(work.n_near.numpy()):
+        listed = work.near.numpy()[body, :n]
+        assert (np.diff(listed) > 0).all()
+        near[body, listed] = True
+    assert not (near & ~meet).any() and (near == near.T).all()
+    sure, _ = brute_force(scene, state.x.numpy().astype(float))
+    assert all(near[i // 8, body] for i, body in sure) and near[0, 19]
+
+
+def test_hits_are_sorted_by_vertex_and_body_with_planes_last(rng, stages, jittered, turned):
+    scene = Scene()
+    scene.add_plane((0.0, 0.0, 1.0), -0.1)
+    for _ in range(5):
+        scene.add_body(jittered(1.0, 2), RUBBER, rng.uniform(-0.3, 0.3, 3), turned())
+    model, state, work = stages(scene, Capacity(slots=8, contacts=4096))
+    pairs = found(model, state, work)
+    detect.list_hits(model, state.x, work)
+    below = np.flatnonzero(
+        (state.x.numpy()[:, 2] < np.float32(-0.1)) & (model.on_surface.numpy() == 1)
+    )
+    want = sorted(pairs + [(int(i), model.n_body) for i in below])
+    start = work.hit_start.numpy()
+    got = list(
+        zip(work.hit_vert.numpy().tolist(), work.hit_body.numpy().tolist(), strict=True)
+    )
+    assert got[: start[-1]] == want
+    np.testing.assert_array_equal(
+        np.diff(start), np.bincount([i for i, _ in want], minlength=model.n_vert)
+    )
+
+
+def crowd(rng, turned) -> Scene:
+    scene = Scene()
+    for _ in range(6):
+        scene.add_body(box(0.2, 2), RUBBER, rng.uniform(-0.06, 0.06, 3), turned())
+    scene.add_plane((0.0, 0.0, 1.0), -0.05)
+    return scene
+
+
+def test_what_does_not_fit_is_counted(rng, stages, turned):
+    scene = crowd(rng, turned)
+    ample = stages(scene, Capacity(slots=8, near=8))
+    most = np.bincount([i for i, _ in found(*ample)]).max()
+    model, state, work = stages(scene, Capacity(slots=1, near=8))
+    found(model, state, work)
+    assert most > 1
+    assert work.contacts.needed.numpy()[1] == 2  # one more than there is
+    model, state, work = stages(scene, Capacity(slots=8, near=2))
+    found(model, state, work)
+    assert work.contacts.needed.numpy()[3] == ample[2].n_near.numpy().max()
+    assert work.n_near.numpy().max() == 2
+
+
+def test_a_simulation_grows_its_buffers_and_loses_nothing(rng, turned):
+    scene = crowd(rng, turned)
+    tiny = Simulation(scene, fps=1000)
+    ample = Simulation(scene, fps=1000)
+    tight = Capacity(contacts=1, slots=1, edge_slots=1, near=1, pairs=1)
+    roomy = Capacity(contacts=8192, slots=8, edge_slots=8, near=8, pairs=64)
+    tiny._work = allocate_work(tiny.model, tiny.state, tight)
+    ample._work = allocate_work(ample.model, ample.state, roomy)
+    for sim in (tiny, ample):
+        sim.step_frame()
+    np.testing.assert_array_equal(tiny.positions(), ample.positions())
+    np.testing.assert_array_equal(tiny.velocities(), ample.velocities())
+    assert tiny.measure().forces == ample.measure().forces
+    assert tiny._work.capacity.contacts > 1 and tiny._work.capacity.near > 1

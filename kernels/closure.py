@@ -1,24 +1,25 @@
 """Stage 4, the end: every colliding vertex into the plane of its triangle.
 
 The impulses of stage 5 once more, on positions instead of velocities and with gaps as targets.
-With e_k the mobility of vertex k in contact c and N_k the contacts that share it,
+With W of impulse.py,
 
-    W = sum a_k^2 N_k e_k,   p <- max(0, p - (g + slack) / W),   x_k += a_k e_k dp n
+    p <- max(0, p - (g + slack) / W),   x_k += a_k dp n / m_k
 
-Mobilities are 1 / m: the centre of mass of a contact stays where it is. Where the search ran, those
-of the two sides are scaled so that the sides share the overlap as the search did. Eq. (1) alone
-leaves 25 to 38 % of an overlap between a vertex and the middle of a triangle.
+The mobility is 1 / m, so the centre of mass of a contact stays where it is. Eq. (1) alone leaves
+25 to 38 % of an overlap between a vertex and the middle of a triangle. An overlap that was there
+when the step began is left to the search, which knows better than the masses who should yield.
 
 A move p n of a pair that slides by u_t changes the angular momentum by p n x u_t. It is handed back
-to the velocities as the couple of impulse.py, dv_k = (b_k . p u_t) n / m_k; where the search has
-scaled the mobilities, momentum is not kept by design and nothing is handed back.
+to the velocities as the couple of impulse.py, dv_k = (b_k . p u_t) n / m_k.
 
 slack is what exceeds the largest move of a step, less the resting gap of the impulses: a body that
-starts deep inside another would be inverted by a full correction.
+starts deep inside another would be inverted by a full correction. Contacts without an overlap are
+only kept from getting one.
 """
 
 import warp as wp
 
+from warp_contact.kernels.geometry import NONE
 from warp_contact.kernels.impulse import REST, gap
 
 wp.set_module_options({"enable_backward": False})
@@ -40,7 +41,7 @@ def leftover(
     dt: wp.array[float],  # (1,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
-    left: wp.array[float],  # (capacity,) [m]
+    left: wp.array[float],  # (capacity,) [m], 0 up to the tolerance
     # out, added to
     found: wp.array[int],  # (2,) 1 when any overlap is to be closed, and to be searched
     deep_found: wp.array[int],  # (1,) 1 when any has been to be searched since the frame began
@@ -54,8 +55,8 @@ def leftover(
         return
     d = -gap(c, vert, coef, normal, offset, pair[c][1] >= body_edge.shape[0], x)
     edge = body_edge[pair[c][0]]
-    left[c] = wp.max(d, 0.0)
     if d > tolerance * edge:
+        left[c] = d
         found[0] = 1
     if d > deep * edge and -closing[c] * dt[0] > deep * edge:
         found[1] = 1
@@ -66,13 +67,15 @@ def leftover(
 def begin_closure(
     # in
     bound: float,  # largest move in a step, in edges
+    deep: float,  # of an edge: an overlap at the start of the step that is left to the search
     n_contact: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,)
     body_edge: wp.array[float],  # (n_body,) [m]
+    closing: wp.array[float],  # (capacity,) [m/s] gap at the start of the step / dt
+    dt: wp.array[float],  # (1,) [s]
     left: wp.array[float],  # (capacity,) [m]
     # out
     slack: wp.array[float],  # (capacity,) [m]
-    scale: wp.array[wp.vec2],  # (capacity,) of the mobilities of both sides
     push: wp.array[float],  # (capacity,) [kg m]
 ):
     """One thread per contact: what stays for later steps."""
@@ -80,58 +83,12 @@ def begin_closure(
     if c >= n_contact[0]:
         return
     edge = body_edge[pair[c][0]]
-    slack[c] = wp.max(left[c] - bound * edge, 0.0) - REST * edge
-    scale[c] = wp.vec2(1.0, 1.0)
+    slack[c] = 0.0
+    if left[c] > 0.0:
+        slack[c] = wp.max(left[c] - bound * edge, 0.0) - REST * edge
+    if -closing[c] * dt[0] > deep * edge:
+        slack[c] = NONE
     push[c] = 0.0
-
-
-@wp.func
-def mobilities(
-    c: int,
-    vert: wp.array2d[int],
-    coef: wp.array2d[float],
-    start: wp.array[int],
-    inv_mass: wp.array[float],
-) -> wp.vec2:
-    """W of the side that moves along the normal, and of the other [1/kg]."""
-    w = wp.vec2(0.0, 0.0)
-    for k in range(5):
-        i = vert[c, k]
-        part = coef[c, k] * coef[c, k] * float(start[i + 1] - start[i]) * inv_mass[i]
-        if k < 2:
-            w[0] += part
-        else:
-            w[1] += part
-    return w
-
-
-@wp.kernel
-def share_as_found(
-    # in
-    deep: float,  # of an edge; less at the start of the step keeps the shares of the masses
-    n_contact: wp.array[int],  # (1,)
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5)
-    pair: wp.array[wp.vec2i],  # (capacity,)
-    start: wp.array[int],  # (n_vert + 1,)
-    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
-    body_edge: wp.array[float],  # (n_body,) [m]
-    closing: wp.array[float],  # (capacity,) [m/s] gap at the start of the step / dt
-    dt: wp.array[float],  # (1,) [s]
-    upper: wp.array[wp.vec3],  # (capacity,) (., ., fraction) of the side that moves along n
-    lower: wp.array[wp.vec3],  # (capacity,)
-    # out
-    scale: wp.array[wp.vec2],  # (capacity,)
-):
-    """One thread per contact: scale the mobilities to the fractions of the search."""
-    c = wp.tid()
-    if c >= n_contact[0] or -closing[c] * dt[0] <= deep * body_edge[pair[c][0]]:
-        return
-    w = mobilities(c, vert, coef, start, inv_mass)
-    total = upper[c][2] + lower[c][2]
-    if w[0] > 0.0 and w[1] > 0.0 and upper[c][2] >= 0.0 and lower[c][2] >= 0.0 and total > 0.0:
-        f = upper[c][2] / total
-        scale[c] = wp.vec2(f * (w[0] + w[1]) / w[0], (1.0 - f) * (w[0] + w[1]) / w[1])
 
 
 @wp.kernel
@@ -146,11 +103,9 @@ def solve_gaps(
     normal: wp.array[wp.vec3],  # (capacity,)
     offset: wp.array[float],  # (capacity,) [m]
     pair: wp.array[wp.vec2i],  # (capacity,)
-    start: wp.array[int],  # (n_vert + 1,)
-    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    weight: wp.array[float],  # (capacity,) [1/kg] W
     body_edge: wp.array[float],  # (n_body,) [m]
     slack: wp.array[float],  # (capacity,) [m]
-    scale: wp.array[wp.vec2],  # (capacity,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     done: wp.array[int],  # (1,) passes so far
     # in, out
@@ -165,14 +120,12 @@ def solve_gaps(
     if c >= n_contact[0]:
         return
     change[c] = wp.vec3(0.0, 0.0, 0.0)
-    w = mobilities(c, vert, coef, start, inv_mass)
-    total = w[0] * scale[c][0] + w[1] * scale[c][1]
-    if total <= 0.0:
+    if weight[c] == 0.0:
         return
     g = gap(c, vert, coef, normal, offset, pair[c][1] >= n_body, x) + slack[c]
     if g < -tolerance * body_edge[pair[c][0]] and done[0] < passes:
         again[0] = 1
-    p = wp.max(push[c] - g / total, 0.0)
+    p = wp.max(push[c] - g / weight[c], 0.0)
     change[c] = (p - push[c]) * normal[c]
     push[c] = p
 
@@ -183,7 +136,6 @@ def close_gaps(
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
     coef: wp.array2d[float],  # (capacity, 5)
-    scale: wp.array[wp.vec2],  # (capacity,)
     change: wp.array[wp.vec3],  # (capacity,) [kg m]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
     # in, out
@@ -196,11 +148,7 @@ def close_gaps(
     p = wp.vec3(0.0, 0.0, 0.0)
     for e in range(start[i], start[i + 1]):
         c = entry[e] // 5
-        k = entry[e] - 5 * c
-        side = scale[c][0]
-        if k >= 2:
-            side = scale[c][1]
-        p += coef[c, k] * side * change[c]
+        p += coef[c, entry[e] - 5 * c] * change[c]
     x[i] = x[i] + inv_mass[i] * p
 
 
@@ -210,7 +158,6 @@ def couples(
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
-    scale: wp.array[wp.vec2],  # (capacity,)
     push: wp.array[float],  # (capacity,) [kg m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
@@ -221,7 +168,7 @@ def couples(
     if c >= n_contact[0]:
         return
     change[c] = wp.vec3(0.0, 0.0, 0.0)
-    if push[c] == 0.0 or scale[c][0] != 1.0:
+    if push[c] == 0.0:
         return
     u = wp.vec3(0.0, 0.0, 0.0)
     for k in range(5):

@@ -10,9 +10,9 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-# A segment that passes through the common edge of two triangles must hit at least one of them,
-# so triangles are grown by this fraction; float32 weights are good to about 1e-6.
-GROWN = wp.constant(1.0e-5)
+# Triangles are grown by this fraction for segments: one through the common edge of two triangles
+# must hit at least one of them, and one from a vertex in the skin of stage 1 the face above it.
+GROWN = wp.constant(1.0e-3)
 NONE = wp.constant(1.0e30)  # "no hit" for a distance or a parameter
 
 

@@ -8,12 +8,14 @@ own share of the surface, seen along s:
 (a nodal force carries a third of its triangles). The other side's traction is interpolated with
 the weights of eqs. (1) and (2): P_other = sum w_i tau_i / sum w_i over the vertices that touch
 this vertex's triangles, blended into sum b_j tau_j over its own contact triangle where there are
-few. Between x0 and the trial each side acts like a spring, k = (P - P0) / a, so that
+few. A trial half way gives each side its stiffness, k = 2 (P(1/2) - P(0)), and
 
-    balanced   a <- (P0_other - P0_own + k_other) / (k_own + k_other)
+    balanced   a = (k_other + c (P_other - P_own)) / (k_own + k_other)   with the pressures at x0
+               a <- a + c (P_other - P_own) / (k_own + k_other)          with those at a
 
-solves P_own(a) = P_other(1 - a); both sides solve it and meet in the middle, a <- (a + 1 - b) / 2,
-so that no gap and no overlap comes from their disagreement.
+Both sides do so and meet in the middle, a <- (a + 1 - b) / 2, so that no gap and no overlap comes
+from their disagreement. k is the stiffness of a side that moves as a whole; one vertex against its
+neighbours is several times stiffer, so only the part c of an imbalance is corrected at a time.
 
     literal    P_own = f / A, P_other = sum w_i f_i / (A sum w_i) with f = -F . s^ (eq. 2 as
                printed: A is the same on both sides of the comparison and falls out of it), and
@@ -30,6 +32,7 @@ from warp_contact.kernels.motion import corner_sum
 wp.set_module_options({"enable_backward": False})
 
 FEW = wp.constant(0.05)  # weight of touching vertices that counts as much as the own triangle
+CAUTION = wp.constant(0.25)  # c above; 1 makes neighbours take turns at 0 and 1
 RIGID = wp.constant(-1.0)  # stands for the fraction of a rigid side
 
 
@@ -96,17 +99,32 @@ def tractions(
 
 
 @wp.kernel
+def stiffnesses(
+    # in
+    s: wp.array[wp.vec3],  # (n_vert,) [m]
+    before: wp.array[float],  # (n_vert,) [Pa] traction at x0
+    half: wp.array[float],  # (n_vert,) [Pa] traction half way
+    # out
+    stiffness: wp.array[float],  # (n_vert,) [Pa] traction gained over the whole of s
+):
+    """One thread per vertex of the region."""
+    i = wp.tid()
+    if wp.length_sq(s[i]) > 0.0:
+        stiffness[i] = 2.0 * wp.max(half[i] - before[i], 0.0)
+
+
+@wp.kernel
 def side_means(
     # in
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
     s: wp.array[wp.vec3],  # (n_vert,) [m]
-    before: wp.array[float],  # (n_vert,) [Pa] traction at x0
-    now: wp.array[float],  # (n_vert,) [Pa] traction at the trial
+    traction: wp.array[float],  # (n_vert,) [Pa]
+    stiffness: wp.array[float],  # (n_vert,) [Pa]
     fraction: wp.array[float],  # (n_vert,)
     # out
-    upper: wp.array[wp.vec3],  # (capacity,) (before, now, fraction) of the side that moves along n
+    upper: wp.array[wp.vec3],  # (capacity,) (traction, stiffness, fraction), side along n
     lower: wp.array[wp.vec3],  # (capacity,) the same of the other side
 ):
     """One thread per contact: interpolate both sides to the contact point."""
@@ -121,7 +139,7 @@ def side_means(
         i = vert[c, k]
         w = wp.abs(coef[c, k])
         if w > 0.0 and wp.length_sq(s[i]) > 0.0:
-            value = wp.vec3(before[i], now[i], fraction[i])
+            value = wp.vec3(traction[i], stiffness[i], fraction[i])
             if k < 2:
                 up += w * value
                 up_weight += w
@@ -142,7 +160,7 @@ def opposite(
     upper: wp.array[wp.vec3],
     lower: wp.array[wp.vec3],
 ) -> wp.vec4:
-    """Mean (before, now, fraction) of what vertex i touches, and the touching weight sum w_i.
+    """Mean (traction, stiffness, fraction) of what vertex i touches, and the sum w_i.
 
     The fraction is RIGID when something it touches cannot move.
     """
@@ -176,8 +194,9 @@ def opposite(
 
 
 @wp.kernel
-def solve_balance(
+def correct_balance(
     # in
+    anew: bool,  # start from the stiffnesses, not from the fraction so far
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -185,12 +204,12 @@ def solve_balance(
     upper: wp.array[wp.vec3],  # (capacity,)
     lower: wp.array[wp.vec3],  # (capacity,)
     s: wp.array[wp.vec3],  # (n_vert,) [m]
-    before: wp.array[float],  # (n_vert,) [Pa]
-    now: wp.array[float],  # (n_vert,) [Pa]
+    traction: wp.array[float],  # (n_vert,) [Pa]
+    stiffness: wp.array[float],  # (n_vert,) [Pa]
     # in, out
     fraction: wp.array[float],  # (n_vert,)
 ):
-    """One thread per vertex of the region: its own solution of P_own(a) = P_other(1 - a)."""
+    """One thread per vertex of the region: towards P_own(a) = P_other(1 - a)."""
     i = wp.tid()
     if wp.length_sq(s[i]) == 0.0:
         return
@@ -198,11 +217,12 @@ def solve_balance(
     if other[2] == RIGID:
         fraction[i] = 1.0
         return
-    k_own = wp.max(now[i] - before[i], 0.0) / wp.max(fraction[i], 1.0e-3)
-    k_other = wp.max(other[1] - other[0], 0.0) / wp.max(other[2], 1.0e-3)
-    if k_own + k_other > 0.0:
-        a = (other[0] - before[i] + k_other) / (k_own + k_other)
-        fraction[i] = wp.clamp(a, 0.0, 1.0)
+    k = stiffness[i] + other[1]
+    if k > 0.0:
+        a = fraction[i]
+        if anew:
+            a = other[1] / k
+        fraction[i] = wp.clamp(a + CAUTION * (other[0] - traction[i]) / k, 0.0, 1.0)
 
 
 @wp.kernel
@@ -247,7 +267,7 @@ def bisect(
     if wp.length_sq(s[i]) == 0.0:
         return
     other = opposite(i, start, entry, coef, left, upper, lower)
-    if other[2] == RIGID or wp.max(other[1], 0.0) > wp.max(force[i], 0.0):
+    if other[2] == RIGID or wp.max(other[0], 0.0) > wp.max(force[i], 0.0):
         fraction[i] = fraction[i] + step
     else:
         fraction[i] = fraction[i] - step
@@ -256,13 +276,17 @@ def bisect(
 @wp.kernel
 def displace(
     # in
+    bound: float,  # largest move, in edges
+    vert_body: wp.array[int],  # (n_vert,)
+    body_edge: wp.array[float],  # (n_body,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m]
     s: wp.array[wp.vec3],  # (n_vert,) [m]
     fraction: wp.array[float],  # (n_vert,)
     # out
     x: wp.array[wp.vec3],  # (n_vert,) [m]
 ):
-    """One thread per vertex of the region: x = x0 + a s."""
+    """One thread per vertex of the region: x = x0 + a s, with a shorter s if s is beyond the bound."""
     i = wp.tid()
-    if wp.length_sq(s[i]) > 0.0:
-        x[i] = x0[i] + fraction[i] * s[i]
+    size = wp.length(s[i])
+    if size > 0.0:
+        x[i] = x0[i] + fraction[i] * wp.min(bound * body_edge[vert_body[i]] / size, 1.0) * s[i]

@@ -32,7 +32,7 @@ DAMPING = 1e-3  # [s]
 SEED = 5
 
 FRAMES = 120
-VIEW = {"eye": (0.5, -1.3, 1.05), "target": (0.0, 0.0, 0.3)}
+VIEW = {"eye": (0.85, -2.3, 1.55), "target": (0.0, 0.0, 0.45)}
 PENALTY = {"stiffness": 2000.0, "damping": 0.5}  # [N/m], [N s/m]: E edge of an element
 
 

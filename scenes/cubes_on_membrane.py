@@ -23,7 +23,7 @@ DAMPING = 1e-3  # [s]
 GAP = 0.005  # the cubes fall by this [m]
 
 FRAMES = 120
-VIEW = {"eye": (0.15, -0.85, 0.45), "target": (0.0, 0.0, 0.0)}
+VIEW = {"eye": (0.12, -1.05, 0.3), "target": (0.0, 0.0, 0.02)}
 PENALTY = {"stiffness": 2000.0, "damping": 1.0}  # [N/m], [N s/m]
 
 

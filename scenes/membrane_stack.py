@@ -18,7 +18,7 @@ DENSITY = 1000.0  # [kg/m^3]
 DAMPING = 1e-3  # [s]
 
 FRAMES = 120
-VIEW = {"eye": (0.35, -0.65, 0.3), "target": (0.0, 0.0, 0.06)}
+VIEW = {"eye": (0.45, -0.9, 0.36), "target": (0.0, 0.0, 0.045)}
 PENALTY = {"stiffness": 200.0, "damping": 0.2}  # [N/m], [N s/m]
 
 

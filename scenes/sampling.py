@@ -24,7 +24,7 @@ GAP = 0.01  # the arches fall by this [m]
 SPACING = 0.4  # between the slabs [m]
 
 FRAMES = 120
-VIEW = {"eye": (0.0, -0.9, 0.4), "target": (0.0, 0.0, 0.07)}
+VIEW = {"eye": (0.0, -0.95, 0.35), "target": (0.0, 0.0, 0.075)}
 PENALTY = {"stiffness": 2000.0, "damping": 1.0}  # [N/m], [N s/m]
 
 

@@ -20,7 +20,7 @@ SPEED = 0.02  # of the upper cube, downwards [m/s]
 GAP = 0.001  # at both poles of the sphere [m]
 
 FRAMES = 120
-VIEW = {"eye": (0.1, -0.55, 0.25), "target": (0.0, 0.0, 0.15)}
+VIEW = {"eye": (0.25, -0.85, 0.32), "target": (0.0, 0.0, 0.155)}
 PENALTY = {"stiffness": 1000.0, "damping": 0.5}  # [N/m], [N s/m]: E radius of the sphere
 
 

@@ -161,8 +161,8 @@ def _find_contacts(model, work, x0, x=None, edges=False) -> SimpleNamespace:
 def _records(work) -> SimpleNamespace:
     c = work.contacts
     n = int(c.n.numpy()[0])
-    arrays = {k: a.numpy()[:n] for k, a in vars(c).items() if k not in ("n", "needed", "entry")}
-    return SimpleNamespace(n=n, **{**arrays, "start": c.start.numpy()})
+    arrays = {k: a.numpy()[:n].copy() for k, a in vars(c).items() if k not in ("n", "start")}
+    return SimpleNamespace(n=n, start=c.start.numpy().copy(), **arrays)
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """depth.py: consistent penetration depths, contact triangles, edges across bodies."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -41,7 +43,8 @@ def test_depth_is_exact_under_a_flat_side_on_every_layer(stages, find_contacts, 
 
 def test_depth_and_direction_turn_with_the_frame(rng, stages, find_contacts, turned):
     scenes = []
-    places = rng.uniform(-0.1, 0.1, (2, 3)) + [[0.0, 0.0, 0.0], [0.0, 0.0, 0.65]]
+    places = rng.uniform(-0.1, 0.1, (2, 3))
+    places[1, 2] += 0.65
     turn, shift = turned(), rng.uniform(-2.0, 2.0, 3)
     for q, by in (((0.0, 0.0, 0.0, 1.0), np.zeros(3)), (turn, shift)):
         scene = Scene()
@@ -113,7 +116,7 @@ def test_a_contact_point_lies_along_the_direction_at_the_depth(stages, find_cont
 
 
 class Reference:
-    """Heidelberger et al. (2004) over all triangles in double precision, for one body in another."""
+    """Heidelberger et al. (2004), all triangles, double precision; what is inside one body."""
 
     def __init__(self, model, x: np.ndarray, inside: set[int], body: int):
         self.x, self.inside = x, inside
@@ -123,7 +126,7 @@ class Reference:
         self.area = 0.5 * np.cross(b - a, c - a)
         self.tris = tris
         start, ends = model.vn_start.numpy(), model.vn_vert.numpy()
-        self.neighbours = [ends[i:j] for i, j in zip(start, start[1:], strict=False)]
+        self.neighbours = [ends[i:j] for i, j in pairwise(start)]
 
     def normal(self, t: int, w: np.ndarray) -> np.ndarray:
         """Corner normals over the triangles within the crease angle, whose cosine is 0.6."""

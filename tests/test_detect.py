@@ -128,9 +128,7 @@ def test_hits_are_sorted_by_vertex_and_body_with_planes_last(rng, stages, jitter
     )
     want = sorted(pairs + [(int(i), model.n_body) for i in below])
     start = work.hit_start.numpy()
-    got = list(
-        zip(work.hit_vert.numpy().tolist(), work.hit_body.numpy().tolist(), strict=True)
-    )
+    got = list(zip(work.hit_vert.numpy().tolist(), work.hit_body.numpy().tolist(), strict=True))
     assert got[: start[-1]] == want
     np.testing.assert_array_equal(
         np.diff(start), np.bincount([i for i, _ in want], minlength=model.n_vert)
@@ -173,3 +171,16 @@ def test_a_simulation_grows_its_buffers_and_loses_nothing(rng, turned):
     np.testing.assert_array_equal(tiny.velocities(), ample.velocities())
     assert tiny.measure().forces == ample.measure().forces
     assert tiny._work.capacity.contacts > 1 and tiny._work.capacity.near > 1
+
+
+def test_a_deep_overlap_beyond_the_first_buffer_is_searched_all_the_same():
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    scene.add_body(box(0.2, 1), RUBBER, (1.0, 0.0, 0.1 - 1e-6))  # four shallow contacts come first
+    for k, z in enumerate((1.0, 1.18)):
+        scene.add_body(box(0.2, 2), NeoHookean(1e5 * 10**k, 0.3, 1000.0), (0.0, 0.0, z))
+    tiny, ample = Simulation(scene, fps=1000), Simulation(scene, fps=1000)
+    tiny._work = allocate_work(tiny.model, tiny.state, Capacity(contacts=4))
+    for sim in (tiny, ample):
+        sim.step_frame()
+    np.testing.assert_array_equal(tiny.positions(), ample.positions())

@@ -140,7 +140,7 @@ def test_the_closest_point_of_a_triangle_is_the_least_of_its_features(rng):
     fat = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.1
     x, a, b, c = (y[fat] for y in (x, a, b, c))
     w = run(triangle_closest, np.stack([x, a, b, c]), wp.vec3).astype(float)
-    # Weights of an interior point are quotients of cancelling products: errors grow like 1 / area^2.
+    # Weights of an inner point are quotients of cancelling products: errors grow like 1 / area^2.
     np.testing.assert_allclose(w.sum(axis=1), 1.0, rtol=0.0, atol=TOL)
     assert w.min() >= 0.0
     at = w[:, :1] * a + w[:, 1:2] * b + w[:, 2:] * c

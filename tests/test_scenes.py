@@ -5,7 +5,7 @@ import inspect
 import numpy as np
 import pytest
 
-from warp_contact import scenes
+from warp_contact import Simulation, scenes
 from warp_contact.scene import Body, Scene
 from warp_contact.scenes import bowl, cubes_on_membrane, sampling, squeezed_sphere, two_bodies
 
@@ -172,3 +172,20 @@ def test_the_bowl_repeats_for_a_seed_and_thins_out_by_a_fraction():
     for a, b in zip(one.bodies, two.bodies, strict=True):
         np.testing.assert_array_equal(a.x, b.x)
     assert not np.array_equal(one.bodies[1].x, bowl.build(fraction=0.1, seed=6).bodies[1].x)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", scenes.names())
+def test_a_scene_runs_without_overlap_and_without_inverting_a_tet(name):
+    scene = bowl.build(fraction=0.1) if name == "bowl" else scenes.load(name).build()
+    sim = Simulation(scene)
+    edge = sim.model.body_edge.numpy().min()
+    starts_inside = sim.measure().overlap > 0.0
+    assert starts_inside == (name == "two_bodies")
+    for _ in sim.frames(15 if name == "bowl" else 5):  # to the first contacts
+        now = sim.measure()
+        print(f"{name} {sim.frame}: overlap {now.overlap / edge:.2e} edges")
+        assert np.isfinite(sim.positions()).all() and np.isfinite(sim.velocities()).all()
+        assert np.isfinite(now.energy) and now.volume_ratio > 0.0
+        # Of the smallest edge; bodies that start inside each other take their time.
+        assert starts_inside or now.overlap <= 0.01 * edge

@@ -24,7 +24,7 @@ def main() -> int:
     unknown = set(args.cases) - set(CASES)
     if unknown:
         parser.error(f"no case {', '.join(sorted(unknown))}; there are {', '.join(CASES)}")
-    wp.config.quiet = True
+    wp.config.log_level = wp.LOG_WARNING
     print(table.head())
     missed = 0
     for case in args.cases or CASES:

@@ -18,11 +18,11 @@ class ContactSurface:
     iterations: int = 4
 
     def __post_init__(self):
-        """Raise ValueError for an unknown search or a number of iterations below 1."""
+        """Raise ValueError for an unknown search or a number of iterations below 2."""
         if self.search not in ("balanced", "literal"):
             raise ValueError(f"search '{self.search}' is neither 'balanced' nor 'literal'")
-        if int(self.iterations) != self.iterations or self.iterations < 1:
-            raise ValueError(f"iterations {self.iterations} is not a positive count")
+        if int(self.iterations) != self.iterations or self.iterations < 2:
+            raise ValueError(f"iterations {self.iterations} is not a count of 2 or more")
 
 
 @dataclass(frozen=True)

@@ -119,9 +119,8 @@ def move_surfaces(
             surface.balance(model, state.x, work, response)
 
     def close() -> None:
-        surface.begin_closure(model, work)
         if search:
             wp.capture_if(work.found[1:2], find_surface)
-        surface.close(model, state.x, state.v, work)
+        surface.close(model, state.x, state.v, work, search)
 
     wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else close)

@@ -1,5 +1,7 @@
 """Stages 3 and 4: the deformation region, the search for the contact surface, the closure."""
 
+import math
+
 import warp as wp
 
 from warp_contact.forces import internal_forces
@@ -47,7 +49,7 @@ def begin_search(model: Model, x: wp.array, work: Work) -> None:
 
 
 def balance(model: Model, x: wp.array, work: Work, response: ContactSurface) -> None:
-    """Set ``fraction`` and ``contacts.scale`` where the pressures balance; ``x`` is as before."""
+    """Set ``fraction`` where the pressures balance and move the region there, by ``BOUND``."""
     c = work.contacts
     around = [c.start, c.entry, c.coef, c.left, work.upper_mean, work.lower_mean, work.s]
     wp.launch(
@@ -57,27 +59,29 @@ def balance(model: Model, x: wp.array, work: Work, response: ContactSurface) -> 
         outputs=[work.area, work.fraction],
     )
     _tractions(model, x, work, work.before)
-    for _ in range(response.iterations):
-        _displace(model, x, work)
-        _tractions(model, x, work, work.now)
-        _side_means(work)
+    _displace(model, x, work)
+    _tractions(model, x, work, work.now)
+    wp.launch(
+        surface.stiffnesses,
+        dim=model.n_vert,
+        inputs=[work.s, work.before, work.now],
+        outputs=[work.stiffness],
+    )
+    for k in range(response.iterations - 1):
+        if k > 0:
+            _displace(model, x, work)
+            _tractions(model, x, work, work.now)
+        traction = work.now if k > 0 else work.before
+        _side_means(work, traction)
         wp.launch(
-            surface.solve_balance,
+            surface.correct_balance,
             dim=model.n_vert,
-            inputs=[*around, work.before, work.now],
+            inputs=[k == 0, *around, traction, work.stiffness],
             outputs=[work.fraction],
         )
-        _side_means(work)
+        _side_means(work, traction)
         wp.launch(surface.meet, dim=model.n_vert, inputs=around, outputs=[work.fraction])
-    _side_means(work)
-    wp.launch(
-        closure.share_as_found,
-        dim=work.capacity.contacts,
-        inputs=[DEEP, c.n, c.vert, c.coef, c.pair, c.start, model.inv_mass, model.body_edge]
-        + [c.closing, work.dt, work.upper_mean, work.lower_mean],
-        outputs=[c.scale],
-    )
-    wp.copy(x, work.x)
+    _displace(model, x, work, BOUND)
 
 
 def bisect(model: Model, x: wp.array, work: Work, response: ContactSurface) -> None:
@@ -92,7 +96,7 @@ def bisect(model: Model, x: wp.array, work: Work, response: ContactSurface) -> N
     for k in range(response.iterations):
         _displace(model, x, work)
         _tractions(model, x, work, work.now)
-        _side_means(work)
+        _side_means(work, work.now)
         wp.launch(
             surface.bisect,
             dim=model.n_vert,
@@ -103,23 +107,20 @@ def bisect(model: Model, x: wp.array, work: Work, response: ContactSurface) -> N
     _displace(model, x, work)
 
 
-def begin_closure(model: Model, work: Work) -> None:
-    """Set ``contacts.slack``, ``scale`` and ``push`` of a closure that keeps centres of mass."""
+def close(model: Model, x: wp.array, v: wp.array, work: Work, search: bool) -> None:
+    """Move ``x`` until every colliding vertex lies in the plane of its triangle.
+
+    ``v`` changes only by what keeps the angular momentum. With ``search``, overlaps from before the
+    step are left to it.
+    """
     c = work.contacts
     wp.launch(
         closure.begin_closure,
         dim=work.capacity.contacts,
-        inputs=[BOUND, c.n, c.pair, model.body_edge, c.left],
-        outputs=[c.slack, c.scale, c.push],
+        inputs=[BOUND, DEEP if search else math.inf, c.n, c.pair, model.body_edge]
+        + [c.closing, work.dt, c.left],
+        outputs=[c.slack, c.push],
     )
-
-
-def close(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
-    """Move ``x`` until every colliding vertex lies in the plane of its triangle.
-
-    ``v`` changes only by what keeps the angular momentum.
-    """
-    c = work.contacts
 
     def sweep() -> None:
         next_sweep(work)
@@ -127,13 +128,13 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
             closure.solve_gaps,
             dim=work.capacity.contacts,
             inputs=[TOLERANCE, model.n_body, PASSES, c.n, c.vert, c.coef, c.normal, c.offset]
-            + [c.pair, c.start, model.inv_mass, model.body_edge, c.slack, c.scale, x, work.done],
+            + [c.pair, c.weight, model.body_edge, c.slack, x, work.done],
             outputs=[c.push, c.change, work.again],
         )
         wp.launch(
             closure.close_gaps,
             dim=model.n_vert,
-            inputs=[c.start, c.entry, c.coef, c.scale, c.change, model.inv_mass],
+            inputs=[c.start, c.entry, c.coef, c.change, model.inv_mass],
             outputs=[x],
         )
 
@@ -143,7 +144,7 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
     wp.launch(
         closure.couples,
         dim=work.capacity.contacts,
-        inputs=[c.n, c.vert, c.coef, c.scale, c.push, v],
+        inputs=[c.n, c.vert, c.coef, c.push, v],
         outputs=[c.change],
     )
     wp.launch(
@@ -154,9 +155,12 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
     )
 
 
-def _displace(model: Model, x: wp.array, work: Work) -> None:
+def _displace(model: Model, x: wp.array, work: Work, bound: float = math.inf) -> None:
     wp.launch(
-        surface.displace, dim=model.n_vert, inputs=[work.x, work.s, work.fraction], outputs=[x]
+        surface.displace,
+        dim=model.n_vert,
+        inputs=[bound, model.vert_body, model.body_edge, work.x, work.s, work.fraction],
+        outputs=[x],
     )
 
 
@@ -170,11 +174,11 @@ def _tractions(model: Model, x: wp.array, work: Work, out: wp.array) -> None:
     )
 
 
-def _side_means(work: Work) -> None:
+def _side_means(work: Work, traction: wp.array) -> None:
     c = work.contacts
     wp.launch(
         surface.side_means,
         dim=work.capacity.contacts,
-        inputs=[c.n, c.vert, c.coef, work.s, work.before, work.now, work.fraction],
+        inputs=[c.n, c.vert, c.coef, work.s, traction, work.stiffness, work.fraction],
         outputs=[work.upper_mean, work.lower_mean],
     )

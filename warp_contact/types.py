@@ -156,7 +156,6 @@ class Contacts:
         change: impulse of the last sweep [N s], shape (capacity,)
         left: overlap after the impulses [m], shape (capacity,)
         slack: part of it that later steps resolve [m], shape (capacity,)
-        scale: of the mobilities of both sides in the closure, shape (capacity,)
         push: of the closure [kg m], shape (capacity,)
     """
 
@@ -180,7 +179,6 @@ class Contacts:
     change: wp.array
     left: wp.array
     slack: wp.array
-    scale: wp.array
     push: wp.array
 
 

@@ -46,6 +46,7 @@ class Work:
         s: displacement vectors [m], shape (n_vert,)
         area: areas of comparison [m^2], shape (n_vert,)
         before, now: tractions before stage 4 and at a trial [Pa], shape (n_vert,)
+        stiffness: traction gained over the whole of s [Pa], shape (n_vert,)
         fraction: part of s, shape (n_vert,)
         upper_mean, lower_mean: both sides of each contact, shape (capacity.contacts,)
         impulse: received by each vertex since the frame began [N s], shape (n_vert,)
@@ -94,6 +95,7 @@ class Work:
     area: wp.array
     before: wp.array
     now: wp.array
+    stiffness: wp.array
     fraction: wp.array
     upper_mean: wp.array
     lower_mean: wp.array
@@ -153,6 +155,7 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
         area=_floats(n),
         before=_floats(n),
         now=_floats(n),
+        stiffness=_floats(n),
         fraction=_floats(n),
         upper_mean=_vectors(m),
         lower_mean=_vectors(m),
@@ -214,7 +217,6 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         change=_vectors(m),
         left=_floats(m),
         slack=_floats(m),
-        scale=wp.zeros(m, dtype=wp.vec2),
         push=_floats(m),
     )
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from checks.table import Row
 
 import warp_contact as wc
+from checks.table import Row
 from warp_contact.scene import rotation_matrix
 
 EDGE = 0.1  # of a block [m]

@@ -5,9 +5,9 @@ from itertools import product
 
 import numpy as np
 import warp as wp
-from checks.table import Row
 
 import warp_contact as wc
+from checks.table import Row
 from warp_contact import forces
 
 SIZE, CELLS = (0.4, 0.1, 0.1), (8, 2, 2)  # [m], held at one end
@@ -58,7 +58,8 @@ def decay(case: str, material, ratio: float) -> Iterator[Row]:
     measured = -np.polyfit(time, envelope, 1)[0] * 2.0 * np.pi / damped
     asked = 2.0 * np.pi * ratio / np.sqrt(1.0 - ratio**2)
     if ratio:
-        yield Row(case, "logarithmic decrement [% off]", 100.0 * (measured / asked - 1.0), 5.0, -5.0)
+        off = 100.0 * (measured / asked - 1.0)
+        yield Row(case, "logarithmic decrement [% off]", off, 5.0, -5.0)
     else:
         yield Row(case, "logarithmic decrement", measured, 1e-3, -1e-3)
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
-from checks.heights import facing, height
-from checks.table import Row
 
 import warp_contact as wc
+from checks.heights import facing, height
+from checks.table import Row
 from warp_contact import scenes
 from warp_contact.errors import SimulationError
 from warp_contact.scenes import bowl, membrane_stack
@@ -15,6 +16,7 @@ from warp_contact.scenes import bowl, membrane_stack
 FPS = 60
 DURATION, QUICK = 2.0, 0.5  # [s]
 QUICK_BOWL = {"fraction": 0.2}, 0.25  # settings, [s]
+TINY = 1e-6  # a volume ratio above which a tet is not inverted
 CLEAR = 1e-3  # of an edge: an overlap that counts as resolved
 ROWS = 0.0, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0  # of the energies [s]
 
@@ -97,7 +99,7 @@ def rows(name: str, out: Run, strict: bool) -> Iterator[Row]:
     sim = out.sim
     end = f"{sim.time:.2f} s"
     yield Row(case, "stopped by numbers that are not finite", float(bool(out.error)), 0.0)
-    least = 0.0 if strict else None
+    least = TINY if strict else None
     yield Row(case, f"smallest volume ratio at {end}", out.volume_ratio[-1], least=least)
     yield Row(case, "smallest volume ratio ever", min(out.volume_ratio))
     fallen = FALLEN[name](sim)
@@ -106,11 +108,13 @@ def rows(name: str, out: Run, strict: bool) -> Iterator[Row]:
     yield Row(case, "bodies fallen through", len(fallen), 0.0 if strict else None)
     overlap, frame, pair = out.deepest
     if out.overlap[0] > CLEAR:
-        clear = out.clear if out.clear is not None else float("nan")
-        limit = float(sim.frame) if strict else None
-        yield Row(case, "first frame without overlap", clear, limit)
-    where = f" frame {frame}, {' in '.join(pair)}" if pair else ""
-    yield Row(case, f"deepest overlap [% of an edge]{where}", 100.0 * overlap, 1.0 if strict else None)
+        clear = float("nan") if out.clear is None else out.clear
+        yield Row(case, "first frame without overlap", clear, sim.frame if strict else None)
+    if out.clear is None:
+        overlap = max(out.overlap[1:], default=out.overlap[0])
+    yield Row(case, "deepest overlap [% of an edge]", 100.0 * overlap, 1.0 if strict else None)
+    if pair:
+        yield Row(case, f"in frame: {' in '.join(pair)}", frame)
     yield Row(case, f"overlap at {end} [% of an edge]", 100.0 * out.overlap[-1])
     yield Row(case, "kinetic energy, largest [J]", max(out.kinetic))
     yield Row(case, f"kinetic energy at {end} [J]", out.kinetic[-1])
@@ -131,8 +135,9 @@ def not_rising(*stacks: tuple[str, ...]) -> Callable[[wc.Simulation], list[str]]
 
     def fallen(sim: wc.Simulation) -> list[str]:
         at = centres(sim)
-        low = [label for label in at if any(n[2] > 0.5 and at[label] @ n < h for n, h in sim.scene.planes)]
-        pairs = (pair for stack in stacks for pair in zip(stack, stack[1:], strict=False))
+        planes = [(n, h) for n, h in sim.scene.planes if n[2] > 0.5]
+        low = [label for label in at if any(at[label] @ n < h for n, h in planes)]
+        pairs = (pair for stack in stacks for pair in pairwise(stack))
         return low + [upper for lower, upper in pairs if not at[upper][2] > at[lower][2]]
 
     return fallen
@@ -152,19 +157,19 @@ def out_of_dish(sim: wc.Simulation) -> list[str]:
     radius, depth, wall = (bowl.DISH[key] for key in ("radius", "depth", "thickness"))
     curve = 0.5 * (radius**2 + depth**2) / depth
     hub = np.array([0.0, 0.0, wall + curve])
-    at = centres(sim)
-    del at["dish"]
-    return [
-        label
-        for label, x in at.items()
-        if x[2] < 0.0 or (np.hypot(*x[:2]) < radius and np.linalg.norm(x - hub) > curve and x[2] < depth)
-    ]
+    fallen = []
+    for label, x in centres(sim).items():
+        below_rim = np.hypot(*x[:2]) < radius and x[2] < depth
+        if label != "dish" and (x[2] < 0.0 or (below_rim and np.linalg.norm(x - hub) > curve)):
+            fallen.append(label)
+    return fallen
 
 
 FALLEN: dict[str, Callable[[wc.Simulation], list[str]]] = {
     "two_bodies": not_rising(("equal_lower", "equal_upper"), ("unequal_lower", "unequal_upper")),
     "sampling": not_rising(
-        ("coarse_on_fine_slab", "coarse_on_fine_arch"), ("fine_on_coarse_slab", "fine_on_coarse_arch")
+        ("coarse_on_fine_slab", "coarse_on_fine_arch"),
+        ("fine_on_coarse_slab", "fine_on_coarse_arch"),
     ),
     "cubes_on_membrane": through_membrane,
     "squeezed_sphere": not_rising(("lower_cube", "sphere", "upper_cube")),

@@ -9,12 +9,11 @@ from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-import warp as wp
-from checks.heights import facing, height
-from checks.table import Row
 
 import warp_contact as wc
-from warp_contact import detect, impulse, solver, surface
+from checks.heights import facing, height
+from checks.table import Row
+from warp_contact import detect, solver, surface
 from warp_contact.types import Capacity
 from warp_contact.work import Work, allocate_work
 
@@ -109,7 +108,7 @@ def settle(sim: wc.Simulation, work: Work) -> int:
         surface.leftover(model, state.x, work)
         if not work.found.numpy()[0]:
             return call
-        solver.move_surfaces(model, state, work, sim.response)
+        solver.move_surfaces(model, state, work, sim.response, search=True)
     return CALLS
 
 
@@ -128,5 +127,5 @@ def first_speed(scene: wc.Scene, search: str) -> float:
     work = allocate_work(sim.model, sim.state, Capacity(contacts=4096))
     work.dt.fill_(DT)
     work.bodies.rebuild()
-    solver.step(sim.model, sim.state, work, sim.response, stages=0, unit=1.0)
+    solver.step(sim.model, sim.state, work, sim.response, stages=0, search=True, unit=1.0)
     return float(np.linalg.norm(sim.velocities(), axis=1).max())

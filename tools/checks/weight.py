@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
-from checks.table import Row
 
 import warp_contact as wc
+from checks.table import Row
 
 EDGE = 0.1  # of a block [m]
 YOUNG, POISSON, DENSITY = 5e4, 0.3, 1000.0  # [Pa], [-], [kg/m^3]

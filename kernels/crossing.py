@@ -8,7 +8,9 @@ the impulses on the vertices lead. An edge pq enters N through the triangle t1 a
     face      otherwise: the middle of the inner piece of pq against its closest surface point
 
 The ridge is also left when it is more than twice as far from pq as the middle is from the surface:
-an edge that lies flush in a face would else be pushed out sideways through the other faces.
+an edge that lies flush in a face would else be pushed out sideways through the other faces. And it
+is left for the face when it would have overlapped more at the start of the step already: the lines
+have passed each other.
 
 With one end inside, the triangle closest to that end stands for t2, and only a ridge makes a
 contact: the vertex has one of its own, but where two rims cross it lies beside the overlap.
@@ -22,10 +24,12 @@ from warp_contact.kernels.geometry import (
     projected_crossing,
     projected_weights,
 )
-from warp_contact.kernels.penetration import SLIP
+from warp_contact.kernels.penetration import SLIP, STALE
 from warp_contact.kernels.surface_query import Hit, closest_hit, first_crossing, hit_point
 
 wp.set_module_options({"enable_backward": False})
+
+FLAT = wp.constant(2.0e-4)  # of an edge: an edge this deep lies in the face, whatever its direction
 
 
 @wp.func
@@ -102,16 +106,29 @@ def on_face(middle: wp.vec3, t: float, hit: Hit, tris: wp.array[wp.vec3i], x: wp
 
 
 @wp.func
+def start_gap(c: EdgeContact, i: int, j: int, x0: wp.array[wp.vec3]) -> float:
+    """Gap of an edge's contact at the start of the step [m]."""
+    own = x0[i] + c.t * (x0[j] - x0[i])
+    other = c.w[0] * x0[c.vert[0]] + c.w[1] * x0[c.vert[1]] + c.w[2] * x0[c.vert[2]]
+    return wp.dot(own - other, c.n)
+
+
+@wp.func
 def edge_contact(
     surface: wp.uint64,
     body: int,
-    reach: float,  # where a search for the closest point starts [m]
+    edge: float,  # mean edge of the body [m]
+    fresh: bool,  # there are no overlaps from before the step
     tris: wp.array[wp.vec3i],
+    x0: wp.array[wp.vec3],
     x: wp.array[wp.vec3],
-    p: wp.vec3,
-    q: wp.vec3,
+    i: int,
+    j: int,
 ) -> EdgeContact:
-    """The contact of the edge pq with a body, if it has one."""
+    """The contact of the edge from i to j with a body, if it has one."""
+    p = x[i]
+    q = x[j]
+    reach = 0.1 * edge
     none = EdgeContact()
     crossing = first_crossing(surface, body, tris, x, p, q - p)
     enter = crossing.enter
@@ -122,8 +139,13 @@ def edge_contact(
         hit = closest_hit(surface, body, tris, x, middle, reach)
         contact = on_ridge(p, q, tris[enter.tri], tris[leave.tri], x)
         if contact.found and contact.d <= 2.0 * hit.t:
+            if not fresh or start_gap(contact, i, j, x0) > -STALE * edge:
+                return contact
+            face = on_face(middle, t, hit, tris, x)
+            if start_gap(face, i, j, x0) > start_gap(contact, i, j, x0):
+                return face
             return contact
-        if hit.tri >= 0:
+        if hit.tri >= 0 and hit.t > FLAT * edge:
             return on_face(middle, t, hit, tris, x)
     elif enter.tri >= 0:
         hit = closest_hit(surface, body, tris, x, q, reach)
@@ -140,6 +162,7 @@ def edge_contact(
 def count_crossings(
     # in
     edge_slots: int,  # of each edge
+    fresh: bool,  # there are no overlaps from before the step
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     edges: wp.array[wp.vec4i],  # (n_edge,)
@@ -149,6 +172,7 @@ def count_crossings(
     near: wp.array2d[int],  # (n_body, capacity)
     lower: wp.array[wp.vec3],  # (n_body,) [m]
     upper: wp.array[wp.vec3],  # (n_body,) [m]
+    x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     count: wp.array[int],  # (n_edge + 1,)
@@ -166,8 +190,10 @@ def count_crossings(
         for k in range(n_near[m]):
             body = near[m, k]
             if boxes_meet(wp.min(p, q), wp.max(p, q), lower[body], upper[body]):
-                reach = 0.1 * body_edge[body]
-                if edge_contact(surface, body, reach, tris, x, p, q).found:
+                i = edges[e][0]
+                j = edges[e][1]
+                edge = body_edge[body]
+                if edge_contact(surface, body, edge, fresh, tris, x0, x, i, j).found:
                     if n < edge_slots:
                         edge_body[e, n] = body
                     n += 1
@@ -179,6 +205,7 @@ def count_crossings(
 @wp.kernel
 def edge_contacts(
     # in
+    fresh: bool,  # there are no overlaps from before the step
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     edges: wp.array[wp.vec4i],  # (n_edge,)
@@ -206,7 +233,7 @@ def edge_contacts(
         body = edge_body[e, s]
         i = edges[e][0]
         j = edges[e][1]
-        found = edge_contact(surface, body, 0.1 * body_edge[body], tris, x, x[i], x[j])
+        found = edge_contact(surface, body, body_edge[body], fresh, tris, x0, x, i, j)
         t = found.vert
         w = found.w
         if found.ridge:

@@ -15,7 +15,7 @@ wp.set_module_options({"enable_backward": False})
 
 # A vertex this little outside of a tet, in barycentric weights, counts as inside: where two rims
 # lie flush, rounding would else let corners slip past each other. Less than the resting gap.
-SKIN = wp.constant(4.0e-4)
+SKIN = wp.constant(0.0)
 
 
 @wp.func

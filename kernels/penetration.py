@@ -16,7 +16,8 @@ All tet edges take part: with surface edges alone, a vertex inside a flat face h
 neighbours only. Terms with (x_k - p) . n_k <= 0 leave by a side that faces away and are dropped.
 The contact point is where the ray p + t r leaves N (Spillmann & Teschner 2005, section 3.2), and t
 replaces d. Where no direction is known, or the ray would leave much deeper than d tells, the
-closest point of N's surface serves instead.
+closest point of N's surface serves instead. So it does where the contact would have overlapped at
+the start of the step already, and the closest point's less: the vertex came in by another side.
 
 Triangle and direction are those at the predicted positions, the weights those at the start of the
 step x0, seen along the direction: sum a_k x0_k is then parallel to the normal impulse and angular
@@ -28,6 +29,7 @@ import warp as wp
 from warp_contact.kernels.geometry import projected_weights
 from warp_contact.kernels.hashing import is_inside
 from warp_contact.kernels.surface_query import (
+    Hit,
     closest_hit,
     first_hit,
     hit_normal,
@@ -38,6 +40,8 @@ from warp_contact.kernels.surface_query import (
 wp.set_module_options({"enable_backward": False})
 
 SLIP = wp.constant(0.25)  # change of the weights in a step above which they are taken at its end
+STALE = wp.constant(0.02)  # of an edge: overlap at the start of a step that tells a wrong direction
+FLUSH = wp.constant(1.0e-5)  # of an edge: a vertex this deep lies in the surface
 FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
 
 
@@ -151,10 +155,41 @@ def propagate(
         pending[0] = 1
 
 
+@wp.struct
+class VertexContact:
+    hit: Hit
+    n: wp.vec3
+    start: float  # gap at the start of the step [m]
+
+
+@wp.func
+def along(
+    hit: Hit, i: int, n: wp.vec3, tris: wp.array[wp.vec3i], x0: wp.array[wp.vec3]
+) -> VertexContact:
+    """The contact of vertex i with a hit, along n."""
+    out = VertexContact()
+    out.hit = hit
+    out.n = n
+    out.start = wp.dot(x0[i] - hit_point(hit, tris, x0), n)
+    return out
+
+
+@wp.func
+def outward(hit: Hit, i: int, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3]) -> wp.vec3:
+    """From vertex i to its closest point, or along the face where i is outside or on it."""
+    t = tris[hit.tri]
+    n = wp.normalize(wp.cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]))
+    gap = hit_point(hit, tris, x) - x[i]
+    if wp.dot(gap, n) > 0.0:
+        n = wp.normalize(gap)
+    return n
+
+
 @wp.kernel
 def vertex_contacts(
     # in
     n_body: int,
+    fresh: bool,  # there are no overlaps from before the step
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     body_edge: wp.array[float],  # (n_body,) [m]
@@ -200,25 +235,30 @@ def vertex_contacts(
         return
     if on_surface[i] == 0:
         return
-    r = hit_dir[e]
+    edge = body_edge[body]
     known = hit_layer[e] >= 0
-    hit = closest_hit(surface, body, tris, x, x[i], 0.1 * body_edge[body]) if not known else (
-        leaving_hit(surface, body, tris, x, x[i], r)
-    )
-    if known and (hit.tri < 0 or hit.t > FAR * wp.max(hit_depth[e], 0.0) + 0.05 * body_edge[body]):
-        known = False
-        hit = closest_hit(surface, body, tris, x, x[i], 0.1 * body_edge[body])
-    if hit.tri < 0:
-        return
-    t = tris[hit.tri]
+    out = VertexContact()
+    if known:
+        ray = leaving_hit(surface, body, tris, x, x[i], hit_dir[e])
+        known = ray.tri >= 0 and ray.t <= FAR * wp.max(hit_depth[e], 0.0) + 0.05 * edge
+        if known:
+            out = along(ray, i, hit_dir[e], tris, x0)
+    if not known or (fresh and out.start < -STALE * edge):
+        near = closest_hit(surface, body, tris, x, x[i], 0.1 * edge)
+        if near.tri >= 0:
+            other = along(near, i, outward(near, i, tris, x), tris, x0)
+            if not known or other.start > out.start:
+                out = other
+                known = True
+                if near.t < FLUSH * edge:
+                    return
     if not known:
-        gap = hit_point(hit, tris, x) - x[i]
-        r = wp.normalize(wp.cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]))
-        if wp.dot(gap, r) > 0.0:
-            r = wp.normalize(gap)
+        return
+    t = tris[out.hit.tri]
+    r = out.n
     w = projected_weights(x0[i], r, x0[t[0]], x0[t[1]], x0[t[2]])
-    if wp.length(w - hit.w) > SLIP:
-        w = hit.w
+    if wp.length(w - out.hit.w) > SLIP:
+        w = out.hit.w
     vert[e, 2] = t[0]
     vert[e, 3] = t[1]
     vert[e, 4] = t[2]
@@ -227,4 +267,4 @@ def vertex_contacts(
     coef[e, 3] = -w[1]
     coef[e, 4] = -w[2]
     normal[e] = r
-    depth[e] = wp.max(hit.t, 0.0)
+    depth[e] = out.hit.t

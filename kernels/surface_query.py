@@ -17,6 +17,7 @@ from warp_contact.kernels.geometry import NONE, area_vector, segment_hit, triang
 
 wp.set_module_options({"enable_backward": False})
 
+OBLIQUE = wp.constant(0.1)  # cosine: a ray along a wall in which it starts does not leave by it
 CREASE = wp.constant(0.6)  # cosine: edges sharper than 53 degrees keep their face normals
 
 
@@ -157,7 +158,8 @@ def leaving_hit(
         a = x[tris[k][0]]
         b = x[tris[k][1]]
         c = x[tris[k][2]]
-        if wp.dot(r, wp.cross(b - a, c - a)) > 0.0:
+        n = wp.cross(b - a, c - a)
+        if wp.dot(r, n) > OBLIQUE * wp.length(n):
             h = segment_hit(p, r, a, b, c)
             if h[0] >= 0.0 and (h[0] < best.t or (h[0] == best.t and k < best.tri)):
                 best.tri = k

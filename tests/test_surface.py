@@ -74,7 +74,8 @@ def test_a_side_that_is_pressed_already_yields_less_or_more(stages, find_contact
     find_contacts(model, work, state.x)
     surface.leftover(model, state.x, work)
     surface.begin_search(model, state.x, work)
-    surface.balance(model, state.x, work, ContactSurface())
+    # An imbalance is corrected by a quarter at a time: 0.75^15 of it is left.
+    surface.balance(model, state.x, work, ContactSurface(iterations=16))
     share = work.fraction.numpy()
     one, two = inner(model, work)
     assert len(one) == len(two) == 9
@@ -93,10 +94,10 @@ def test_both_sides_of_the_balanced_search_meet(rng, stages, find_contacts, reco
     region = np.linalg.norm(work.s.numpy(), axis=1) > 0.0
     up, lo = mean_over(c, [0, 1], share, region), mean_over(c, [2, 3, 4], share, region)
     total = (up + lo)[c.left > 0.0]
-    print(f"total fractions {total.min():.3f} to {total.max():.3f}, off by {np.abs(total - 1).mean()}")
+    print(f"off by {np.abs(total - 1.0).mean():.3f}, {total.min():.3f} to {total.max():.3f}")
     assert len(total) > 20
     # Where the meshes do not match, interpolation to and fro leaves this much of an overlap.
-    assert np.abs(total - 1.0).mean() < 0.1
+    assert np.abs(total - 1.0).mean() < 0.075
 
 
 def nodal_forces(model, x: np.ndarray) -> np.ndarray:
@@ -173,7 +174,7 @@ def test_a_uniform_pressure_is_the_same_on_both_sides_whatever_the_density(
     find_contacts(model, work, state.x)
     surface.leftover(model, state.x, work)
     surface.begin_search(model, state.x, work)
-    surface.balance(model, state.x, work, ContactSurface(iterations=1))
+    surface.balance(model, state.x, work, ContactSurface(iterations=2))
     c = records(work)
     traction = work.before.numpy()
     for side in inner(model, work):

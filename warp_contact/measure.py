@@ -6,8 +6,9 @@ import numpy as np
 import warp as wp
 
 from warp_contact import topology
-from warp_contact.forces import energies
+from warp_contact.forces import energies, internal_forces
 from warp_contact.kernels import measure as kernels
+from warp_contact.kernels import motion
 from warp_contact.types import Model, State
 from warp_contact.work import Work, launch_body_boxes, launch_triangle_boxes
 
@@ -17,7 +18,8 @@ class Measure:
     """One frame in numbers.
 
     Attributes:
-        kinetic: energy [J]
+        kinetic: energy [J] at the time of the frame; the velocities of symplectic Euler are those of
+            half a step earlier, so h/2 times the power of internal forces and gravity is added
         elastic: energy [J]
         gravitational: energy against the origin [J]
         momentum: [kg m/s], shape (3,)
@@ -58,8 +60,10 @@ class Meter:
         self._volume = model.volume.numpy()
         self._bvhs = None
 
-    def measure(self, state: State, work: Work, unit: float, duration: float) -> Measure:
-        """Measure a state; ``duration`` [s] is how long impulses were recorded."""
+    def measure(
+        self, state: State, work: Work, unit: float, duration: float, dt: float
+    ) -> Measure:
+        """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s]."""
         model = self.model
         x = state.x.numpy().astype(np.float64)
         v = state.v.numpy().astype(np.float64)
@@ -68,7 +72,7 @@ class Meter:
         p = self.mass[:, None] * v
         overlap, pair = self.overlap(state.x)
         return Measure(
-            kinetic=float(0.5 * (p * v).sum()),
+            kinetic=float(0.5 * (p * v).sum() + 0.5 * dt * (self._forces(state.x) * v).sum()),
             elastic=float(energy.numpy().sum(dtype=np.float64)),
             gravitational=float(-(self.mass @ x) @ np.array(model.gravity)),
             momentum=p.sum(axis=0),
@@ -79,6 +83,21 @@ class Meter:
             volume_ratio=float((topology.signed_volumes(x, self._tets) / self._volume).min()),
             forces=self.forces(work, unit, duration),
         )
+
+    def _forces(self, x: wp.array) -> np.ndarray:
+        """Internal forces and weight of the mobile vertices [N], shape (n_vert, 3)."""
+        model = self.model
+        f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+        f = wp.zeros(model.n_vert, dtype=wp.vec3)
+        internal_forces(model, x, wp.full(model.n_tet, 1, dtype=int), f_tet)
+        wp.launch(
+            motion.gather,
+            dim=model.n_vert,
+            inputs=[model.vt_start, model.vt_corner, f_tet],
+            outputs=[f],
+        )
+        total = f.numpy() + self.mass[:, None] * np.array(model.gravity)
+        return np.where(model.inv_mass.numpy()[:, None] > 0.0, total, 0.0)
 
     def forces(self, work: Work, unit: float, duration: float) -> dict[tuple[str, str], float]:
         """Mean force between the bodies of each touching pair [N], in the order of the bodies."""

@@ -22,6 +22,8 @@ from warp_contact.work import Work, allocate_work
 SAFETY = 0.8  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
+TRAVEL = 0.05  # of the shortest mean edge: the same
+KEEP = 0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
 UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
 ATTEMPTS = 12  # at a frame, with larger buffers or shorter steps each time
 
@@ -82,6 +84,7 @@ class Simulation:
         mobile = float(self.model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
         self._unit = UNIT * (mobile if mobile > 0.0 else 1.0)
         self._thickness = float(self.model.body_thickness.numpy().min())
+        self._edge = float(self.model.body_edge.numpy().min())
         self._largest_inv_mass = float(inv_mass.max())
         self._graphs: dict[tuple[int, bool], wp.Graph] = {}
         self._search: bool | None = None  # whether some overlap was not created by a step
@@ -166,7 +169,8 @@ class Simulation:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""
         with wp.ScopedDevice(self.device):
             duration = 1.0 / self.fps if self.frame else 0.0
-            return self._meter.measure(self.state, self._work, self._unit, duration)
+            dt = duration / max(self.substeps, 1)
+            return self._meter.measure(self.state, self._work, self._unit, duration, dt)
 
     def contact_fields(self) -> dict[str, np.ndarray]:
         """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
@@ -219,8 +223,9 @@ class Simulation:
         speed = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0)))
         speed += float(np.linalg.norm(self.model.gravity)) / self.fps
         stable = omega / (2.0 * SAFETY)
-        seen = speed / (REACH * self._thickness)
-        return max(1, math.ceil(max(stable, seen) / self.fps))
+        seen = speed / min(REACH * self._thickness, TRAVEL * self._edge)
+        wanted = math.ceil(max(stable, seen) / self.fps)
+        return max(1, wanted, int(KEEP * self.substeps))
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured step with so many stages of damping."""

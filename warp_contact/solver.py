@@ -27,8 +27,8 @@ def step(
     """
     if isinstance(response, Penalty):
         detect.near_bodies(model, state.x, state.x, work)
-        vertex_contacts(model, state.x, state.x, work)  # forces belong to the positions they act at
-        edge_contacts(model, state.x, state.x, work)
+        vertex_contacts(model, state.x, state.x, work, False)  # forces belong to the positions they act at
+        edge_contacts(model, state.x, state.x, work, False)
         predict(model, state, work, stages)
         impulse.push(model, state.v, work, response)
         drift(model, state, work, state.x)
@@ -36,16 +36,16 @@ def step(
         predict(model, state, work, stages)
         detect.near_bodies(model, state.x, work.x, work)
         wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
-        vertex_contacts(model, state.x, state.x, work)
+        vertex_contacts(model, state.x, state.x, work, False)
         move_surfaces(model, state, work, response, search)
         impulse.exchange(model, state.v, work)
     else:
         predict(model, state, work, stages)
         detect.near_bodies(model, state.x, work.x, work)
-        vertex_contacts(model, state.x, work.x, work)
+        vertex_contacts(model, state.x, work.x, work, not search)
         impulse.exchange(model, state.v, work)
         drift(model, state, work, work.x)
-        edge_contacts(model, state.x, work.x, work)
+        edge_contacts(model, state.x, work.x, work, not search)
         wp.capture_if(work.n_crossing, lambda: impulse.exchange(model, state.v, work))
         drift(model, state, work, state.x)
         move_surfaces(model, state, work, response, search)  # what the step did not create
@@ -56,7 +56,7 @@ def overlaps(model: Model, state: State, work: Work) -> bool:
     """Whether bodies overlap by more than a search is worth; reads back, so not for a step."""
     work.dt.fill_(1.0)
     detect.near_bodies(model, state.x, state.x, work)
-    vertex_contacts(model, state.x, state.x, work)
+    vertex_contacts(model, state.x, state.x, work, False)
     surface.leftover(model, state.x, work)
     return bool(work.found.numpy()[1])
 
@@ -83,22 +83,26 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
     )
 
 
-def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+def vertex_contacts(
+    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool
+) -> None:
     """Stages 1 and 2: contacts of vertices inside other bodies at the positions ``x``."""
     detect.find_inside(model, x, work)
     detect.list_hits(model, x, work)
     depth.hit_depths(model, x, work)
-    depth.vertex_contacts(model, x0, x, work)
+    depth.vertex_contacts(model, x0, x, work, fresh)
     depth.contacts_by_vertex(model, work)
     impulse.begin(model, x0, work, work.none)
 
 
-def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+def edge_contacts(
+    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool
+) -> None:
     """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
-    detect.find_crossings(model, x, work)
+    detect.find_crossings(model, x0, x, work, fresh)
 
     def append() -> None:
-        depth.edge_contacts(model, x0, x, work)
+        depth.edge_contacts(model, x0, x, work, fresh)
         depth.contacts_by_vertex(model, work)
         impulse.begin(model, x0, work, work.n_hit)
 

@@ -102,9 +102,9 @@ def settle(sim: wc.Simulation, work: Work) -> int:
     work.bodies.rebuild()
     for call in range(CALLS):
         detect.near_bodies(model, state.x, state.x, work)
-        solver.vertex_contacts(model, state.x, state.x, work)
+        solver.vertex_contacts(model, state.x, state.x, work, fresh=False)
         if sim.response.search == "balanced":
-            solver.edge_contacts(model, state.x, state.x, work)
+            solver.edge_contacts(model, state.x, state.x, work, fresh=False)
         surface.leftover(model, state.x, work)
         if not work.found.numpy()[0]:
             return call

@@ -13,7 +13,7 @@ wp.set_module_options({"enable_backward": False})
 # Triangles are grown by this fraction for segments: one through the common edge of two triangles
 # must hit at least one of them, and one from a vertex in the skin of stage 1 the face above it.
 GROWN = wp.constant(1.0e-5)
-GRAZING = wp.constant(5.0e-3)  # sine below which a segment lies in a face and does not cross it
+PARALLEL = wp.constant(1.0e-7)  # sine that float32 cannot tell from zero
 NONE = wp.constant(1.0e30)  # "no hit" for a distance or a parameter
 
 
@@ -41,17 +41,19 @@ def area_vector(a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def segment_hit(p: wp.vec3, u: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
+def segment_hit(
+    p: wp.vec3, u: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, grazing: float
+) -> wp.vec3:
     """Parameter t and weights (v, w) of b and c where p + t u meets the triangle's plane.
 
-    t is NONE when the line is all but parallel to the plane or misses the triangle.
+    t is NONE when the line misses the triangle or the sine to its plane is not above ``grazing``.
     """
     e1 = b - a
     e2 = c - a
     g = wp.cross(u, e2)
     det = wp.dot(e1, g)
     size = wp.length(wp.cross(e1, e2)) * wp.length(u)
-    if wp.abs(det) <= GRAZING * size:
+    if wp.abs(det) <= grazing * size:
         return wp.vec3(NONE, 0.0, 0.0)
     r = p - a
     v = wp.dot(r, g) / det

@@ -13,10 +13,17 @@ joins the blend only when it is within the crease angle.
 
 import warp as wp
 
-from warp_contact.kernels.geometry import NONE, area_vector, segment_hit, triangle_closest
+from warp_contact.kernels.geometry import (
+    NONE,
+    PARALLEL,
+    area_vector,
+    segment_hit,
+    triangle_closest,
+)
 
 wp.set_module_options({"enable_backward": False})
 
+GRAZING = wp.constant(5.0e-3)  # sine below which a tet edge lies in a wall and does not cross it
 OBLIQUE = wp.constant(0.1)  # cosine: a ray along a wall in which it starts does not leave by it
 CREASE = wp.constant(0.6)  # cosine: edges sharper than 53 degrees keep their face normals
 
@@ -60,7 +67,7 @@ def first_hit(
         b = x[tris[k][1]]
         c = x[tris[k][2]]
         if side * wp.dot(u, wp.cross(b - a, c - a)) > 0.0:
-            h = segment_hit(p, u, a, b, c)
+            h = segment_hit(p, u, a, b, c, GRAZING)
             if h[0] > after and h[0] <= 1.0:
                 if h[0] < best.t or (h[0] == best.t and k < best.tri):
                     best.tri = k
@@ -98,7 +105,7 @@ def first_crossing(
         a = x[tris[k][0]]
         b = x[tris[k][1]]
         c = x[tris[k][2]]
-        h = segment_hit(p, u, a, b, c)
+        h = segment_hit(p, u, a, b, c, PARALLEL)
         if h[0] > 0.0 and h[0] <= 1.0:
             if wp.dot(u, wp.cross(b - a, c - a)) < 0.0:
                 if h[0] < out.enter.t or (h[0] == out.enter.t and k < out.enter.tri):
@@ -132,7 +139,7 @@ def holds(
         a = x[tris[k][0]]
         b = x[tris[k][1]]
         c = x[tris[k][2]]
-        h = segment_hit(p, up, a, b, c)
+        h = segment_hit(p, up, a, b, c, PARALLEL)
         if h[0] >= 0.0 and h[0] < nearest:
             nearest = h[0]
             inside = wp.dot(up, wp.cross(b - a, c - a)) > 0.0
@@ -160,7 +167,7 @@ def leaving_hit(
         c = x[tris[k][2]]
         n = wp.cross(b - a, c - a)
         if wp.dot(r, n) > OBLIQUE * wp.length(n):
-            h = segment_hit(p, r, a, b, c)
+            h = segment_hit(p, r, a, b, c, PARALLEL)
             if h[0] >= 0.0 and (h[0] < best.t or (h[0] == best.t and k < best.tri)):
                 best.tri = k
                 best.t = h[0]

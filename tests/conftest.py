@@ -151,9 +151,9 @@ def _find_contacts(model, work, x0, x=None, edges=False) -> SimpleNamespace:
 
     x = x0 if x is None else x
     detect.near_bodies(model, x0, x, work)
-    solver.vertex_contacts(model, x0, x, work)
+    solver.vertex_contacts(model, x0, x, work, fresh=False)
     if edges:
-        solver.edge_contacts(model, x0, x, work)
+        solver.edge_contacts(model, x0, x, work, fresh=False)
     assert not work.contacts.needed.numpy().any()
     return _records(work)
 

@@ -88,6 +88,7 @@ class Simulation:
         self._largest_inv_mass = float(inv_mass.max())
         self._graphs: dict[tuple[int, bool], wp.Graph] = {}
         self._search: bool | None = None  # whether some overlap was not created by a step
+        self._dt: float | None = None
         self._rates: tuple[float, float] | None = None
 
     @property
@@ -137,6 +138,7 @@ class Simulation:
                 omega, rate = max(1.2 * omega, after[0]), max(rate, after[1])
                 self._restore()
             self._rates = after
+            self._dt = dt
             self._search = self._search and bool(self._work.deep_found.numpy()[0])
             self.frame += 1
 
@@ -202,6 +204,9 @@ class Simulation:
         n = self._wanted or self._substeps(omega)
         dt = 1.0 / (self.fps * n)
         stages = stages_for(rate, dt)
+        if self._dt is not None and dt != self._dt:
+            work.dt.fill_(0.5 * (self._dt - dt))
+            solver.kick(self.model, self.state, work)  # velocities lag by half a step
         work.dt.fill_(dt)
         work.impulse.zero_()
         work.pair_key.fill_(-1)

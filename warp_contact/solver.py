@@ -61,8 +61,8 @@ def overlaps(model: Model, state: State, work: Work) -> bool:
     return bool(work.found.numpy()[1])
 
 
-def predict(model: Model, state: State, work: Work, stages: int) -> None:
-    """Kick ``state.v`` by internal forces and gravity, damp it, set ``work.x`` = x + h v."""
+def kick(model: Model, state: State, work: Work) -> None:
+    """Add the acceleration by internal forces and gravity over ``work.dt`` to ``state.v``."""
     internal_forces(model, state.x, work.ones, work.f_tet)
     wp.launch(
         motion.predict,
@@ -71,6 +71,11 @@ def predict(model: Model, state: State, work: Work, stages: int) -> None:
         + [wp.vec3(*model.gravity), work.dt, state.x, state.v],
         outputs=[work.x, state.v],
     )
+
+
+def predict(model: Model, state: State, work: Work, stages: int) -> None:
+    """Kick ``state.v``, damp it, set ``work.x`` = x + h v."""
+    kick(model, state, work)
     if stages > 0:
         damp(model, state.x, state.v, work.dt, work.f_tet, (work.v, work.s), stages)
         drift(model, state, work, work.x)

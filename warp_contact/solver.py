@@ -31,6 +31,7 @@ def step(
         edge_contacts(model, state.x, state.x, work, False)
         predict(model, state, work, stages)
         impulse.push(model, state.v, work, response)
+        impulse.record(model, work, unit)
         drift(model, state, work, state.x)
     elif response.search == "literal":
         predict(model, state, work, stages)
@@ -39,6 +40,7 @@ def step(
         vertex_contacts(model, state.x, state.x, work, False)
         move_surfaces(model, state, work, response, search)
         impulse.exchange(model, state.v, work)
+        impulse.record(model, work, unit)
     else:
         predict(model, state, work, stages)
         detect.near_bodies(model, state.x, work.x, work)
@@ -47,9 +49,9 @@ def step(
         drift(model, state, work, work.x)
         edge_contacts(model, state.x, work.x, work, not search)
         wp.capture_if(work.n_crossing, lambda: impulse.exchange(model, state.v, work))
+        impulse.record(model, work, unit)
         drift(model, state, work, state.x)
         move_surfaces(model, state, work, response, search)  # what the step did not create
-    impulse.record(model, work, unit)
 
 
 def overlaps(model: Model, state: State, work: Work) -> bool:
@@ -58,7 +60,8 @@ def overlaps(model: Model, state: State, work: Work) -> bool:
     detect.near_bodies(model, state.x, state.x, work)
     vertex_contacts(model, state.x, state.x, work, False)
     surface.leftover(model, state.x, work)
-    return bool(work.found.numpy()[1])
+    # What did not fit was not looked at.
+    return bool(work.found.numpy()[1]) or bool(work.contacts.needed.numpy().any())
 
 
 def kick(model: Model, state: State, work: Work) -> None:
@@ -130,6 +133,13 @@ def move_surfaces(
     def close() -> None:
         if search:
             wp.capture_if(work.found[1:2], find_surface)
+        surface.close(model, state.x, state.v, work, search)
+        # Moved vertices leave edges across each other that stage 2 could not see.
+        edge_contacts(model, state.x, state.x, work, not search)
+        wp.capture_if(work.n_crossing, close_edges)
+
+    def close_edges() -> None:
+        surface.leftover(model, state.x, work)
         surface.close(model, state.x, state.v, work, search)
 
     wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else close)

@@ -55,7 +55,7 @@ def border_depth(
     vs_start: wp.array[int],  # (n_vert + 1,)
     vs_tri: wp.array[int],  # (3 n_tri,)
     vn_start: wp.array[int],  # (n_vert + 1,)
-    vn_vert: wp.array[int],
+    vn_vert: wp.array[int],  # (2 n_edge of the tets,)
     inside: wp.array[int],  # (n_vert * slots,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     hit_start: wp.array[int],  # (n_vert + 1,)
@@ -119,7 +119,7 @@ def propagate(
     n_body: int,
     layer: wp.array[int],  # (1,)
     vn_start: wp.array[int],  # (n_vert + 1,)
-    vn_vert: wp.array[int],
+    vn_vert: wp.array[int],  # (2 n_edge of the tets,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     hit_start: wp.array[int],  # (n_vert + 1,)
     hit_vert: wp.array[int],  # (capacity,)

@@ -1,7 +1,7 @@
 """Stage 2, edges: surface edges that cross another body.
 
 The paper leaves edge against edge out, but its own scenes need it. Crossings are looked for where
-the impulses on the vertices lead. An edge pq enters N through the triangle t1 and leaves through t2.
+the impulses on the vertices lead. An edge pq enters N through the triangle t1 and leaves by t2.
 
     ridge     t1 and t2 share an edge ab: n = +-(pq x ab), on the side of n1 + n2; the contact joins
               the closest points of pq and ab, kept when both lie inside their segments

@@ -1,9 +1,9 @@
 """Points, segments, triangles and tets: pure functions of positions [m].
 
-    barycentric weights of a point in a tet     x = sum b_k x_k,  sum b_k = 1
-    segment p + t (q - p) against a triangle    Moeller & Trumbore 1997
-    closest point of a triangle                 Ericson 2005, section 5.1.5
-    closest points of two lines                 Ericson 2005, section 5.1.9
+barycentric weights of a point in a tet     x = sum b_k x_k,  sum b_k = 1
+segment p + t (q - p) against a triangle    Moeller & Trumbore 1997
+closest point of a triangle                 Ericson 2005, section 5.1.5
+closest points of two lines                 Ericson 2005, section 5.1.9
 """
 
 import warp as wp
@@ -134,9 +134,7 @@ def projected_crossing(p: wp.vec3, q: wp.vec3, a: wp.vec3, b: wp.vec3, n: wp.vec
     det = wp.dot(n, wp.cross(q - p, b - a))
     if det == 0.0:
         return wp.vec2(0.5, 0.5)
-    return wp.vec2(
-        wp.dot(n, wp.cross(a - p, b - a)) / det, wp.dot(n, wp.cross(a - p, q - p)) / det
-    )
+    return wp.vec2(wp.dot(n, wp.cross(a - p, b - a)) / det, wp.dot(n, wp.cross(a - p, q - p)) / det)
 
 
 @wp.func

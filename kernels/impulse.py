@@ -289,12 +289,16 @@ def add_pair_impulses(
         p = -p
     name = (wp.int64(lo) << wp.int64(32)) | wp.int64(hi)
     n = key.shape[0]
-    slot = int((wp.uint32(lo) * wp.uint32(73856093) ^ wp.uint32(hi) * wp.uint32(19349663)) % wp.uint32(n))
+    slot = int(
+        (wp.uint32(lo) * wp.uint32(73856093) ^ wp.uint32(hi) * wp.uint32(19349663)) % wp.uint32(n)
+    )
     for _probe in range(n):
         seen = wp.atomic_cas(key, slot, wp.int64(-1), name)
         if seen == wp.int64(-1) or seen == name:
             for k in range(3):
-                wp.atomic_add(total, slot, k, wp.int64(wp.round(wp.float64(p[k]) / wp.float64(unit))))
+                wp.atomic_add(
+                    total, slot, k, wp.int64(wp.round(wp.float64(p[k]) / wp.float64(unit)))
+                )
             return
         slot = (slot + 1) % n
     wp.atomic_max(needed, 0, n + 1)

@@ -66,7 +66,10 @@ def vertex_overlaps(
     while wp.bvh_query_next(query, q):
         t = tets[q]
         body = vert_body[t[0]]
-        if body != vert_body[i] and wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0:
+        if (
+            body != vert_body[i]
+            and wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0
+        ):
             hit = closest_hit(surface, body, tris, x, p, 0.1 * body_edge[body])
             if hit.t > overlap[k]:
                 overlap[k] = hit.t

@@ -285,7 +285,7 @@ def displace(
     # out
     x: wp.array[wp.vec3],  # (n_vert,) [m]
 ):
-    """One thread per vertex of the region: x = x0 + a s, with a shorter s if s is beyond the bound."""
+    """One thread per vertex of the region: x = x0 + a s, with s shortened to the bound."""
     i = wp.tid()
     size = wp.length(s[i])
     if size > 0.0:

@@ -101,7 +101,7 @@ def test_no_mode_is_turned_round_or_frozen():
     z = np.linspace(0.0, 1.0, 10001)[:-1]
     for stages in range(1, 20):
         factor = (1.0 + Legendre.basis(stages)(1.0 - 2.0 * z)) / 2.0
-        # P_s > -1 inside (-1, 1); only odd ones come near it, and only where z comes near its limit.
+        # P_s > -1 inside (-1, 1); only odd ones come near it, where z comes near its limit.
         assert factor.min() > 0.0
         assert factor.max() <= 1.0 + 1e-12  # rounding
 

@@ -20,9 +20,7 @@ def tet_weights(x: wp.array2d[wp.vec3], out: wp.array[wp.vec4]):
 @wp.kernel
 def segment_hit(x: wp.array2d[wp.vec3], out: wp.array[wp.vec3]):
     i = wp.tid()
-    out[i] = geometry.segment_hit(
-        x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], geometry.PARALLEL
-    )
+    out[i] = geometry.segment_hit(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], geometry.PARALLEL)
 
 
 @wp.kernel

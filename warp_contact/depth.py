@@ -32,9 +32,7 @@ def hit_depths(model: Model, x: wp.array, work: Work) -> None:
     wp.capture_while(work.pending, fill_layer)
 
 
-def vertex_contacts(
-    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool
-) -> None:
+def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Set the contact records of the hits at ``x`` in a step from ``x0``.
 
     ``fresh``: no overlap is older than the step.
@@ -44,15 +42,20 @@ def vertex_contacts(
         dim=work.capacity.contacts,
         inputs=[model.n_body, fresh, work.surface.id, model.tris, model.body_edge]
         + [model.vert_body, model.on_surface, model.plane_n, model.plane_h, x0, x]
-        + [work.hit_start, work.hit_vert, work.hit_body, work.hit_layer, work.hit_depth, work.hit_dir],
+        + [
+            work.hit_start,
+            work.hit_vert,
+            work.hit_body,
+            work.hit_layer,
+            work.hit_depth,
+            work.hit_dir,
+        ],
         outputs=_records(work),
     )
     _count(work, work.none)
 
 
-def edge_contacts(
-    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool
-) -> None:
+def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Append the contact records of the crossings at ``x`` in a step from ``x0``."""
     wp.launch(
         crossing.edge_contacts,

@@ -56,7 +56,7 @@ def find_inside(model: Model, x: wp.array, work: Work) -> None:
 
 
 def list_hits(model: Model, x: wp.array, work: Work) -> None:
-    """Set ``hit_start``, ``hit_vert``, ``hit_body`` and ``hit_layer``, sorted by vertex and body."""
+    """Set ``hit_start`` and the hits, sorted by vertex and body."""
     slots = work.capacity.slots
     planes = [model.on_surface, model.plane_n, model.plane_h, x]
     wp.launch(
@@ -74,9 +74,7 @@ def list_hits(model: Model, x: wp.array, work: Work) -> None:
     )
 
 
-def find_crossings(
-    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool
-) -> None:
+def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Set ``edge_start`` and ``edge_body``: edges that cross a body with both ends outside."""
     wp.launch(
         crossing.count_crossings,

@@ -79,7 +79,6 @@ def _apply(model: Model, v: wp.array, work: Work) -> None:
     wp.launch(
         impulse.apply_impulses,
         dim=model.n_vert,
-        inputs=[c.start, c.entry, c.coef, c.normal, c.open, c.turn, c.change]
-        + [model.inv_mass],
+        inputs=[c.start, c.entry, c.coef, c.normal, c.open, c.turn, c.change] + [model.inv_mass],
         outputs=[v, work.impulse],
     )

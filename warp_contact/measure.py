@@ -18,8 +18,8 @@ class Measure:
     """One frame in numbers.
 
     Attributes:
-        kinetic: energy [J] at the time of the frame; the velocities of symplectic Euler are those of
-            half a step earlier, so h/2 times the power of internal forces and gravity is added
+        kinetic: energy [J] at the time of the frame; the velocities of symplectic Euler are those
+            of half a step earlier, so h/2 times the power of forces and gravity is added
         elastic: energy [J]
         gravitational: energy against the origin [J]
         momentum: [kg m/s], shape (3,)
@@ -60,9 +60,7 @@ class Meter:
         self._volume = model.volume.numpy()
         self._bvhs = None
 
-    def measure(
-        self, state: State, work: Work, unit: float, duration: float, dt: float
-    ) -> Measure:
+    def measure(self, state: State, work: Work, unit: float, duration: float, dt: float) -> Measure:
         """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s]."""
         model = self.model
         x = state.x.numpy().astype(np.float64)
@@ -144,23 +142,18 @@ class Meter:
         model = self.model
         if self._bvhs is None:
             sizes = model.n_body, model.n_tri, model.n_tet
-            self._boxes = [
-                (wp.zeros(n, dtype=wp.vec3), wp.zeros(n, dtype=wp.vec3)) for n in sizes
-            ]
+            self._boxes = [(wp.zeros(n, dtype=wp.vec3), wp.zeros(n, dtype=wp.vec3)) for n in sizes]
             self._near = wp.full(model.n_body, 1, dtype=int)
         of_body, of_tri, of_tet = self._boxes
         launch_body_boxes(model, x, x, *of_body)
         launch_triangle_boxes(model, x, x, self._near, *of_tri)
-        wp.launch(
-            kernels.tet_boxes, dim=model.n_tet, inputs=[model.tets, x], outputs=list(of_tet)
-        )
+        wp.launch(kernels.tet_boxes, dim=model.n_tet, inputs=[model.tets, x], outputs=list(of_tet))
         if self._bvhs is None:
             vert_body = model.vert_body.numpy()
             world = model.body_world.numpy()[vert_body[self._tets[:, 0]]]
             groups = model.body_world, model.tri_body, wp.array(world, dtype=int)
             self._bvhs = tuple(
-                wp.Bvh(*box, groups=group)
-                for box, group in zip(self._boxes, groups, strict=True)
+                wp.Bvh(*box, groups=group) for box, group in zip(self._boxes, groups, strict=True)
             )
         for bvh in self._bvhs:
             bvh.refit()

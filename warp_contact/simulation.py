@@ -23,7 +23,9 @@ SAFETY = 0.7  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
 TRAVEL = 0.025  # of the shortest mean edge: the same
-KEEP = 0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
+KEEP = (
+    0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
+)
 UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
 ATTEMPTS = 12  # at a frame, with larger buffers or shorter steps each time
 

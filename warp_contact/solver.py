@@ -27,7 +27,9 @@ def step(
     """
     if isinstance(response, Penalty):
         detect.near_bodies(model, state.x, state.x, work)
-        vertex_contacts(model, state.x, state.x, work, False)  # forces belong to the positions they act at
+        vertex_contacts(
+            model, state.x, state.x, work, False
+        )  # forces belong to the positions they act at
         edge_contacts(model, state.x, state.x, work, False)
         predict(model, state, work, stages)
         impulse.push(model, state.v, work, response)
@@ -86,14 +88,10 @@ def predict(model: Model, state: State, work: Work, stages: int) -> None:
 
 def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
     """Set ``out`` = x + h v."""
-    wp.launch(
-        motion.advance, dim=model.n_vert, inputs=[work.dt, state.x, state.v], outputs=[out]
-    )
+    wp.launch(motion.advance, dim=model.n_vert, inputs=[work.dt, state.x, state.v], outputs=[out])
 
 
-def vertex_contacts(
-    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool
-) -> None:
+def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Stages 1 and 2: contacts of vertices inside other bodies at the positions ``x``."""
     detect.find_inside(model, x, work)
     detect.list_hits(model, x, work)
@@ -103,9 +101,7 @@ def vertex_contacts(
     impulse.begin(model, x0, work, work.none)
 
 
-def edge_contacts(
-    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool
-) -> None:
+def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
     detect.find_crossings(model, x0, x, work, fresh)
 

@@ -22,7 +22,8 @@ from warp_contact.work import Work, allocate_work
 SAFETY = 0.7  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
-TRAVEL = 0.025  # of the shortest mean edge: the same
+TRAVEL = 0.025  # of the shortest mean edge: the same, for an impact without a trace of overlap
+PATIENCE = 2.0  # stable steps, at most, that such an impact is worth
 KEEP = (
     0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
 )
@@ -230,8 +231,9 @@ class Simulation:
         speed = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0)))
         speed += float(np.linalg.norm(self.model.gravity)) / self.fps
         stable = omega / (2.0 * SAFETY)
-        seen = speed / min(REACH * self._thickness, TRAVEL * self._edge)
-        wanted = math.ceil(max(stable, seen) / self.fps)
+        passing = speed / (REACH * self._thickness)
+        clean = min(speed / (TRAVEL * self._edge), PATIENCE * stable)
+        wanted = math.ceil(max(stable, passing, clean) / self.fps)
         return max(1, wanted, int(KEEP * self.substeps))
 
     def _graph(self, stages: int) -> wp.Graph:

@@ -56,6 +56,7 @@ class EdgeContact:
     vert: wp.vec3i  # of N
     w: wp.vec3  # their weights
     ridge: bool
+    close: bool  # whether the edge came close enough to be looked at
 
 
 @wp.func
@@ -129,7 +130,7 @@ def edge_contact(
     p = x[i]
     q = x[j]
     reach = 0.1 * edge
-    none = EdgeContact()
+    out = EdgeContact()
     crossing = first_crossing(surface, body, tris, x, p, q - p)
     enter = crossing.enter
     leave = crossing.leave
@@ -150,12 +151,13 @@ def edge_contact(
     elif enter.tri >= 0:
         hit = closest_hit(surface, body, tris, x, q, reach)
         if hit.tri >= 0:
-            return on_ridge(p, q, tris[enter.tri], tris[hit.tri], x)
+            out = on_ridge(p, q, tris[enter.tri], tris[hit.tri], x)
     elif leave.tri >= 0:
         hit = closest_hit(surface, body, tris, x, p, reach)
         if hit.tri >= 0:
-            return on_ridge(p, q, tris[hit.tri], tris[leave.tri], x)
-    return none
+            out = on_ridge(p, q, tris[hit.tri], tris[leave.tri], x)
+    out.close = crossing.close
+    return out
 
 
 @wp.kernel
@@ -163,6 +165,7 @@ def count_crossings(
     # in
     edge_slots: int,  # of each edge
     fresh: bool,  # there are no overlaps from before the step
+    again: bool,  # the second time in a step: only edges that were close the first time
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     edges: wp.array[wp.vec4i],  # (n_edge,)
@@ -174,6 +177,8 @@ def count_crossings(
     upper: wp.array[wp.vec3],  # (n_body,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # in, out
+    edge_close: wp.array[int],  # (n_edge,) 1 where a triangle's box was met
     # out
     count: wp.array[int],  # (n_edge + 1,)
     edge_body: wp.array2d[int],  # (n_edge, edge_slots)
@@ -184,19 +189,28 @@ def count_crossings(
     e = wp.tid()
     m = vert_body[edges[e][0]]
     n = int(0)
-    if n_near[m] > 0:
-        p = x[edges[e][0]]
-        q = x[edges[e][1]]
-        for k in range(n_near[m]):
+    near_count = n_near[m]
+    if again and edge_close[e] == 0:
+        near_count = 0
+    if near_count > 0:
+        i = edges[e][0]
+        j = edges[e][1]
+        p = x[i]
+        q = x[j]
+        close = bool(False)
+        for k in range(near_count):
             body = near[m, k]
             if boxes_meet(wp.min(p, q), wp.max(p, q), lower[body], upper[body]):
-                i = edges[e][0]
-                j = edges[e][1]
                 edge = body_edge[body]
-                if edge_contact(surface, body, edge, fresh, tris, x0, x, i, j).found:
+                contact = edge_contact(surface, body, edge, fresh, tris, x0, x, i, j)
+                close = close or contact.close or contact.found
+                if contact.found:
                     if n < edge_slots:
                         edge_body[e, n] = body
                     n += 1
+        edge_close[e] = int(close)
+    elif not again:
+        edge_close[e] = 0
     if n > edge_slots:
         wp.atomic_max(needed, 0, n)
     count[e] = wp.min(n, edge_slots)

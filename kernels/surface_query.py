@@ -80,6 +80,7 @@ def first_hit(
 class Crossing:
     enter: Hit
     leave: Hit
+    close: bool  # whether any triangle's box was met
 
 
 @wp.func
@@ -102,6 +103,7 @@ def first_crossing(
     root = wp.bvh_get_group_root(surface, body)
     query = wp.bvh_query_aabb(surface, wp.min(p, q), wp.max(p, q), root)
     while wp.bvh_query_next(query, k):
+        out.close = True
         a = x[tris[k][0]]
         b = x[tris[k][1]]
         c = x[tris[k][2]]

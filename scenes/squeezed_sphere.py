@@ -6,7 +6,7 @@ cubes keep their shape. The top of the upper cube comes down at a given speed.
 """
 
 from warp_contact.materials import NeoHookean
-from warp_contact.scene import Scene
+from warp_contact.scene import Scene, rotation_matrix
 from warp_contact.shapes import box, sphere
 
 RADIUS = 0.06  # of the sphere [m]
@@ -18,6 +18,7 @@ DENSITY = 1000.0  # [kg/m^3]
 DAMPING = 1e-3  # [s]
 SPEED = 0.02  # of the upper cube, downwards [m/s]
 GAP = 0.001  # at both poles of the sphere [m]
+TURN = (-0.942545, 0.313881, 0.0, 0.1144)  # stands the sphere on a triangle, not on a vertex
 
 FRAMES = 120
 VIEW = {"eye": (0.25, -0.85, 0.32), "target": (0.0, 0.0, 0.155)}
@@ -33,7 +34,8 @@ def build(
 ) -> Scene:
     """The lower cube stands on z = 0 and is held there, the upper one is held at its top."""
     scene = Scene(friction=friction)
-    cube, ball = box(EDGE, 2), sphere(RADIUS, 41)
+    cube = box(EDGE, 2)
+    ball = sphere(RADIUS, 41).transformed(rotation_matrix(TURN))
     stiff = NeoHookean(ratio * young, 0.3, DENSITY, damping)
     soft = NeoHookean(young, POISSON, DENSITY, damping)
     low, high = ball.vertices[:, 2].min(), ball.vertices[:, 2].max()

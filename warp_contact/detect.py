@@ -74,13 +74,15 @@ def list_hits(model: Model, x: wp.array, work: Work) -> None:
     )
 
 
-def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
+def find_crossings(
+    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, again: bool
+) -> None:
     """Set ``edge_start`` and ``edge_body``: edges that cross a body with both ends outside."""
     wp.launch(
         crossing.count_crossings,
         dim=model.n_edge,
-        inputs=[work.capacity.edge_slots, fresh, work.surface.id, model.tris, model.edges]
+        inputs=[work.capacity.edge_slots, fresh, again, work.surface.id, model.tris, model.edges]
         + [model.vert_body, model.body_edge, work.n_near, work.near, work.lower, work.upper, x0, x],
-        outputs=[work.edge_start, work.edge_body, work.contacts.needed[2:3]],
+        outputs=[work.edge_close, work.edge_start, work.edge_body, work.contacts.needed[2:3]],
     )
     wp.utils.array_scan(work.edge_start, work.edge_start, inclusive=False)

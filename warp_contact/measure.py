@@ -70,7 +70,7 @@ class Meter:
         p = self.mass[:, None] * v
         overlap, pair = self.overlap(state.x)
         return Measure(
-            kinetic=float(0.5 * (p * v).sum() + 0.5 * dt * (self._forces(state.x) * v).sum()),
+            kinetic=float(0.5 * (p * v).sum() + 0.5 * dt * (self._forces(state.x, work) * v).sum()),
             elastic=float(energy.numpy().sum(dtype=np.float64)),
             gravitational=float(-(self.mass @ x) @ np.array(model.gravity)),
             momentum=p.sum(axis=0),
@@ -82,8 +82,8 @@ class Meter:
             forces=self.forces(work, unit, duration),
         )
 
-    def _forces(self, x: wp.array) -> np.ndarray:
-        """Internal forces and weight of the mobile vertices [N], shape (n_vert, 3)."""
+    def _forces(self, x: wp.array, work: Work) -> np.ndarray:
+        """Internal forces and weight [N] of mobile vertices without contact, shape (n_vert, 3)."""
         model = self.model
         f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
         f = wp.zeros(model.n_vert, dtype=wp.vec3)
@@ -95,7 +95,8 @@ class Meter:
             outputs=[f],
         )
         total = f.numpy() + self.mass[:, None] * np.array(model.gravity)
-        return np.where(model.inv_mass.numpy()[:, None] > 0.0, total, 0.0)
+        free = (model.inv_mass.numpy() > 0.0) & ~work.impulse.numpy().any(axis=1)
+        return np.where(free[:, None], total, 0.0)
 
     def forces(self, work: Work, unit: float, duration: float) -> dict[tuple[str, str], float]:
         """Mean force between the bodies of each touching pair [N], in the order of the bodies."""

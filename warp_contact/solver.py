@@ -101,9 +101,14 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
     impulse.begin(model, x0, work, work.none)
 
 
-def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
-    detect.find_crossings(model, x0, x, work, fresh)
+def edge_contacts(
+    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, again: bool = False
+) -> None:
+    """Stages 1 and 2: contacts of edges across other bodies at ``x``.
+
+    ``again``: the second time in a step, for which edges far from everything are known.
+    """
+    detect.find_crossings(model, x0, x, work, fresh, again)
 
     def append() -> None:
         depth.edge_contacts(model, x0, x, work, fresh)
@@ -131,7 +136,7 @@ def move_surfaces(
             wp.capture_if(work.found[1:2], find_surface)
         surface.close(model, state.x, state.v, work, search)
         # Moved vertices leave edges across each other that stage 2 could not see.
-        edge_contacts(model, state.x, state.x, work, not search)
+        edge_contacts(model, state.x, state.x, work, not search, again=True)
         wp.capture_if(work.n_crossing, close_edges)
 
     def close_edges() -> None:

@@ -33,6 +33,7 @@ class Work:
         hit_start: first hit of each vertex, shape (n_vert + 1,)
         hit_vert, hit_body, hit_layer, hit_depth, hit_dir: the hits, shape (capacity.contacts,)
         edge_start: first crossing of each surface edge, shape (n_edge + 1,)
+        edge_close: edges that were close to another body's triangle, shape (n_edge,)
         edge_body: bodies that each edge crosses, shape (n_edge, capacity.edge_slots)
         layer: layer of the propagation, shape (1,)
         pending: whether it goes on, shape (1,)
@@ -80,6 +81,7 @@ class Work:
     hit_depth: wp.array
     hit_dir: wp.array
     edge_start: wp.array
+    edge_close: wp.array
     edge_body: wp.array
     layer: wp.array
     pending: wp.array
@@ -140,6 +142,7 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
         hit_depth=_floats(m),
         hit_dir=_vectors(m),
         edge_start=edge_start,
+        edge_close=_ints(model.n_edge),
         edge_body=wp.zeros((model.n_edge, capacity.edge_slots), dtype=int),
         layer=_ints(1),
         pending=_ints(1),

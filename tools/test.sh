@@ -3,20 +3,7 @@
 set -eu
 CDPATH='' cd -- "$(dirname -- "$0")/.."
 
-python=.venv/bin/python
-stamp=.venv/installed-test
-if ! { pwd; cat pyproject.toml; } | cmp -s - "$stamp"; then
-    if ! "$python" -m pip --version >/dev/null 2>&1; then
-        for found in python3.13 python3.12 python3.11 python3 ''; do
-            "$found" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && break
-        done
-        [ "$found" ] || { echo "test.sh: this needs Python 3.11 or later" >&2; exit 1; }
-        echo "making .venv with $("$found" --version)"
-        "$found" -m venv --clear .venv
-    fi
-    echo "installing into .venv (0.7 GB at first)"
-    "$python" -m pip install --quiet --disable-pip-version-check --editable '.[test]'
-    { pwd; cat pyproject.toml; } >"$stamp"
-fi
+install() { . tools/venv.sh; } # its own "$1", so that the arguments stay
+install test
 
-exec "$python" -P -m pytest "$@"
+exec .venv/bin/python -P -m pytest "$@"

@@ -19,8 +19,8 @@ only kept from getting one.
 
 import warp as wp
 
+from warp_contact.kernels.contact import REST, gap
 from warp_contact.kernels.geometry import NONE
-from warp_contact.kernels.impulse import REST, gap
 
 wp.set_module_options({"enable_backward": False})
 

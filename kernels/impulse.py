@@ -14,19 +14,22 @@ rounding, and stage 2 would lose the edge.
 
 Friction acts across the gap, a couple g0 n x p_t that would change the angular momentum. So u_t is
 taken relative to the turning of the other surface, u_t + g0 sum b_k (n . v_k), and the vertices
-receive g0 (b_k . p_t) n in return; b_j = grad w_j over a triangle, and over two edges the same in
-the basis of their directions.
+receive g0 (b_k . p_t) n in return, with b_k of contact.py.
 
-Each contact sees the share m_k / N_k of a vertex, so the sweep cannot add kinetic energy
-(Tonge, Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly.
-A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
+Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add kinetic energy (Tonge,
+Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly. A fixed
+vertex has 1 / m = 0 and keeps its prescribed velocity.
+
+Sweep j runs from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
+method, except at a contact where that change was a step too far. The last sweep is a plain one.
 """
 
 import warp as wp
 
+from warp_contact.kernels.contact import REST, gap, gradient
+
 wp.set_module_options({"enable_backward": False})
 
-REST = wp.constant(1.0e-3)  # of an edge: the gap that is left between bodies at rest
 TURN = wp.constant(0.1)  # gap times gradient above which a surface cannot take the couple
 STEEP = wp.constant(8.0)  # gradient times edge of a triangle too thin or too tilted for it
 
@@ -38,67 +41,6 @@ def clamped(p: wp.vec3, bound: float) -> wp.vec3:
     if size > bound:
         return p * (bound / size)
     return p
-
-
-@wp.func
-def gap(
-    c: int,
-    vert: wp.array2d[int],
-    coef: wp.array2d[float],
-    normal: wp.array[wp.vec3],
-    offset: wp.array[float],
-    on_plane: bool,
-    x: wp.array[wp.vec3],
-) -> float:
-    """Gap of a contact [m]; positions relative to one vertex keep float32 exact far out."""
-    origin = x[vert[c, 0]]
-    if on_plane:
-        return wp.dot(origin, normal[c]) - offset[c]
-    r = wp.vec3(0.0, 0.0, 0.0)
-    for k in range(5):
-        r += coef[c, k] * (x[vert[c, k]] - origin)
-    return wp.dot(r, normal[c])
-
-
-@wp.func
-def gradient(
-    k: int,
-    c: int,
-    vert: wp.array2d[int],
-    n: wp.vec3,
-    x: wp.array[wp.vec3],
-) -> wp.vec3:
-    """b_k of a contact between bodies [1/m]."""
-    p = x[vert[c, 0]]
-    q = x[vert[c, 1]]
-    a = x[vert[c, 2]]
-    b = x[vert[c, 3]]
-    if vert[c, 3] == vert[c, 4]:  # two edges
-        if k == 4:
-            return wp.vec3(0.0, 0.0, 0.0)
-        along = wp.cross(b - a, n)
-        other = q - p
-        if k >= 2:
-            along = wp.cross(q - p, n)
-            other = b - a
-        whole = wp.dot(along, other)
-        if whole == 0.0:
-            return wp.vec3(0.0, 0.0, 0.0)
-        if k == 0 or k == 2:
-            return -along / whole
-        return along / whole
-    if k < 2:
-        return wp.vec3(0.0, 0.0, 0.0)
-    d = x[vert[c, 4]]
-    whole = wp.dot(n, wp.cross(b - a, d - a))
-    if whole == 0.0:
-        return wp.vec3(0.0, 0.0, 0.0)
-    across = a - b
-    if k == 2:
-        across = b - d
-    if k == 3:
-        across = d - a
-    return wp.cross(across, n) / whole
 
 
 @wp.kernel
@@ -260,45 +202,3 @@ def apply_impulses(
         p += coef[c, k] * change[c] + open[c] * wp.dot(turn[c, k], change[c]) * normal[c]
     v[i] = v[i] + inv_mass[i] * p
     impulse[i] = impulse[i] + p
-
-
-@wp.kernel
-def add_pair_impulses(
-    # in
-    unit: float,  # momentum of one count [N s]
-    n_contact: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    lam: wp.array[float],  # (capacity,) [N s]
-    slip: wp.array[wp.vec3],  # (capacity,) [N s]
-    # in, out
-    key: wp.array[wp.int64],  # (n_pair,) lower body * 2^32 + upper body, -1 where free
-    total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
-    needed: wp.array[int],  # (1,) pairs that would have been enough
-):
-    """One thread per contact: add to its pair, as integers, whose sum has no order."""
-    c = wp.tid()
-    if c >= n_contact[0] or lam[c] <= 0.0:
-        return
-    p = lam[c] * normal[c] + slip[c]
-    lo = pair[c][0]
-    hi = pair[c][1]
-    if lo > hi:
-        lo = pair[c][1]
-        hi = pair[c][0]
-        p = -p
-    name = (wp.int64(lo) << wp.int64(32)) | wp.int64(hi)
-    n = key.shape[0]
-    slot = int(
-        (wp.uint32(lo) * wp.uint32(73856093) ^ wp.uint32(hi) * wp.uint32(19349663)) % wp.uint32(n)
-    )
-    for _probe in range(n):
-        seen = wp.atomic_cas(key, slot, wp.int64(-1), name)
-        if seen == wp.int64(-1) or seen == name:
-            for k in range(3):
-                wp.atomic_add(
-                    total, slot, k, wp.int64(wp.round(wp.float64(p[k]) / wp.float64(unit)))
-                )
-            return
-        slot = (slot + 1) % n
-    wp.atomic_max(needed, 0, n + 1)

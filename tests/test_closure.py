@@ -6,7 +6,7 @@ import pytest
 from warp_contact import ContactSurface, NeoHookean, Scene, box, surface
 
 EDGE = 0.25  # of a cell [m]
-REST = 1e-3  # of an edge: kernels/impulse.py
+REST = 1e-3  # of an edge: kernels/contact.py
 DT = 1e-3
 
 

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_contact.kernels import impulse, penalty
+from warp_contact.kernels import impulse, pairs, penalty
 from warp_contact.response import Penalty
 from warp_contact.types import Model
 from warp_contact.work import Work
@@ -67,7 +67,7 @@ def record(model: Model, work: Work, unit: float) -> None:
     """Add the impulses of the step to their pairs of bodies, in counts of ``unit`` [N s]."""
     c = work.contacts
     wp.launch(
-        impulse.add_pair_impulses,
+        pairs.add_pair_impulses,
         dim=work.capacity.contacts,
         inputs=[unit, c.n, c.pair, c.normal, c.lam, c.slip],
         outputs=[work.pair_key, work.pair_total, c.needed[4:5]],

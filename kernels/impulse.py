@@ -16,9 +16,9 @@ Friction acts across the gap, a couple g0 n x p_t that would change the angular 
 taken relative to the turning of the other surface, u_t + g0 sum b_k (n . v_k), and the vertices
 receive g0 (b_k . p_t) n in return, with b_k of contact.py.
 
-Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add kinetic energy (Tonge,
-Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly. A fixed
-vertex has 1 / m = 0 and keeps its prescribed velocity.
+Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add kinetic energy
+(Tonge, Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly.
+A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
 
 Sweep j runs from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
 method, except at a contact where that change was a step too far. The last sweep is a plain one.

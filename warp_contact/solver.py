@@ -53,6 +53,7 @@ def step(
         wp.capture_if(work.n_crossing, lambda: impulse.exchange(model, state.v, work))
         impulse.record(model, work, unit)
         drift(model, state, work, state.x)
+        edge_contacts(model, state.x, state.x, work, not search, again=True)
         move_surfaces(model, state, work, response, search)  # what the step did not create
 
 

@@ -23,7 +23,7 @@ SAFETY = 0.7  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
 TRAVEL = 0.025  # of the shortest mean edge: the same, for an impact without a trace of overlap
-PATIENCE = 1.5  # stable steps, at most, that such an impact is worth
+PATIENCE = 2.0  # stable steps, at most, that such an impact is worth
 KEEP = (
     0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
 )

@@ -10,6 +10,9 @@ from warp_contact.types import Model, State
 from warp_contact.work import Work
 
 
+LOOKS = 2  # at the edges after the closure, each followed by another closure
+
+
 def step(
     model: Model,
     state: State,
@@ -137,8 +140,9 @@ def move_surfaces(
             wp.capture_if(work.found[1:2], find_surface)
         surface.close(model, state.x, state.v, work, search)
         # Moved vertices leave edges across each other that stage 2 could not see.
-        edge_contacts(model, state.x, state.x, work, not search, again=True)
-        wp.capture_if(work.n_crossing, close_edges)
+        for _ in range(LOOKS):
+            edge_contacts(model, state.x, state.x, work, not search, again=True)
+            wp.capture_if(work.n_crossing, close_edges)
 
     def close_edges() -> None:
         surface.leftover(model, state.x, work)

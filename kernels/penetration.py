@@ -39,7 +39,7 @@ from warp_contact.kernels.surface_query import (
 
 wp.set_module_options({"enable_backward": False})
 
-SLIP = wp.constant(0.25)  # change of the weights in a step above which they are taken at its end
+SLIP = wp.constant(1.0)  # change of the weights in a step above which they are taken at its end
 STALE = wp.constant(0.02)  # of an edge: overlap at the start of a step that tells a wrong direction
 FLUSH = wp.constant(1.0e-5)  # of an edge: a vertex this deep lies in the surface
 FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted

@@ -19,7 +19,7 @@ from warp_contact.spectrum import Spectrum
 from warp_contact.types import Capacity, State
 from warp_contact.work import Work, allocate_work
 
-SAFETY = 0.7  # of the stable step 2 / omega at the start of a frame
+SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
 TRAVEL = 0.025  # of the shortest mean edge: the same, for an impact without a trace of overlap

@@ -10,7 +10,7 @@ from warp_contact.types import Model, State
 from warp_contact.work import Work
 
 
-LOOKS = 2  # at the edges after the closure, each followed by another closure
+LOOKS = 3  # at the edges after the closure, each followed by another closure
 
 
 def step(

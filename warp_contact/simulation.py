@@ -140,6 +140,10 @@ class Simulation:
                     break
                 omega, rate = max(1.2 * omega, after[0]), max(rate, after[1])
                 self._restore()
+            else:
+                raise SimulationError(
+                    f"frame {self.frame + 1}: no stable step found ({self.substeps} substeps)"
+                )
             self._rates = after
             self._dt = dt
             self._search = self._search and bool(self._work.deep_found.numpy()[0])

@@ -9,7 +9,6 @@ from warp_contact.response import ContactSurface, Penalty
 from warp_contact.types import Model, State
 from warp_contact.work import Work
 
-
 LOOKS = 3  # at the edges after the closure, each followed by another closure
 
 

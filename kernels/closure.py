@@ -111,7 +111,7 @@ def solve_gaps(
     # in, out
     push: wp.array[float],  # (capacity,) [kg m]
     # out
-    change: wp.array[wp.vec3],  # (capacity,) [kg m]
+    part: wp.array[wp.vec3],  # (5 capacity,) [kg m] what it moves at each vertex
     # out, added to
     again: wp.array[int],  # (1,) 1 when a gap is still open
 ):
@@ -119,37 +119,15 @@ def solve_gaps(
     c = wp.tid()
     if c >= n_contact[0]:
         return
-    change[c] = wp.vec3(0.0, 0.0, 0.0)
-    if weight[c] == 0.0:
-        return
-    g = gap(c, vert, coef, normal, offset, pair[c][1] >= n_body, x) + slack[c]
-    if g < -tolerance * body_edge[pair[c][0]] and done[0] < passes:
-        again[0] = 1
-    p = wp.max(push[c] - g / weight[c], 0.0)
-    change[c] = (p - push[c]) * normal[c]
+    p = float(0.0)
+    if weight[c] > 0.0:
+        g = gap(c, vert, coef, normal, offset, pair[c][1] >= n_body, x) + slack[c]
+        if g < -tolerance * body_edge[pair[c][0]] and done[0] < passes:
+            again[0] = 1
+        p = wp.max(push[c] - g / weight[c], 0.0)
+    for k in range(5):
+        part[5 * c + k] = coef[c, k] * (p - push[c]) * normal[c]
     push[c] = p
-
-
-@wp.kernel
-def close_gaps(
-    # in
-    start: wp.array[int],  # (n_vert + 1,)
-    entry: wp.array[int],  # (5 capacity,)
-    coef: wp.array2d[float],  # (capacity, 5)
-    change: wp.array[wp.vec3],  # (capacity,) [kg m]
-    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
-    # in, out
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-):
-    """One thread per vertex: gather the moves of its contacts in their order."""
-    i = wp.tid()
-    if start[i] == start[i + 1] or inv_mass[i] == 0.0:
-        return
-    p = wp.vec3(0.0, 0.0, 0.0)
-    for e in range(start[i], start[i + 1]):
-        c = entry[e] // 5
-        p += coef[c, entry[e] - 5 * c] * change[c]
-    x[i] = x[i] + inv_mass[i] * p
 
 
 @wp.kernel
@@ -158,42 +136,20 @@ def couples(
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
+    normal: wp.array[wp.vec3],  # (capacity,)
+    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
     push: wp.array[float],  # (capacity,) [kg m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
-    change: wp.array[wp.vec3],  # (capacity,) [kg m^2/s] p u
+    part: wp.array[wp.vec3],  # (5 capacity,) [kg m/s] what it hands back at each vertex
 ):
     """One thread per contact: the couple that its push leaves behind."""
     c = wp.tid()
     if c >= n_contact[0]:
         return
-    change[c] = wp.vec3(0.0, 0.0, 0.0)
-    if push[c] == 0.0:
-        return
     u = wp.vec3(0.0, 0.0, 0.0)
+    if push[c] > 0.0:
+        for k in range(5):
+            u += coef[c, k] * v[vert[c, k]]
     for k in range(5):
-        u += coef[c, k] * v[vert[c, k]]
-    change[c] = push[c] * u
-
-
-@wp.kernel
-def hand_back(
-    # in
-    start: wp.array[int],  # (n_vert + 1,)
-    entry: wp.array[int],  # (5 capacity,)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
-    change: wp.array[wp.vec3],  # (capacity,) [kg m^2/s]
-    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
-    # in, out
-    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
-):
-    """One thread per vertex: gather its part of the couples."""
-    i = wp.tid()
-    if start[i] == start[i + 1] or inv_mass[i] == 0.0:
-        return
-    p = wp.vec3(0.0, 0.0, 0.0)
-    for e in range(start[i], start[i + 1]):
-        c = entry[e] // 5
-        p += wp.dot(turn[c, entry[e] - 5 * c], change[c]) * normal[c]
-    v[i] = v[i] + inv_mass[i] * p
+        part[5 * c + k] = push[c] * wp.dot(turn[c, k], u) * normal[c]

@@ -19,16 +19,27 @@ contact: the vertex has one of its own, but where two rims cross it lies beside 
 import warp as wp
 
 from warp_contact.kernels.geometry import (
-    boxes_meet,
+    NONE,
     lines_closest,
     projected_crossing,
     projected_weights,
 )
 from warp_contact.kernels.penetration import SLIP, STALE
-from warp_contact.kernels.surface_query import Hit, closest_hit, first_crossing, hit_point
+from warp_contact.kernels.surface_query import (
+    Crossing,
+    Hit,
+    closer,
+    closest_hit,
+    hit_point,
+    no_crossing,
+    starts_inside,
+    with_tri,
+)
 
 wp.set_module_options({"enable_backward": False})
 
+# Of the skin: two skins less the way of both bodies. The impulses seldom use up the rest of it.
+SURE = wp.constant(0.25)
 FLAT = wp.constant(2.0e-4)  # of an edge: an edge this deep lies in the face, whatever its direction
 
 
@@ -56,7 +67,6 @@ class EdgeContact:
     vert: wp.vec3i  # of N
     w: wp.vec3  # their weights
     ridge: bool
-    close: bool  # whether the edge came close enough to be looked at
 
 
 @wp.func
@@ -115,11 +125,66 @@ def start_gap(c: EdgeContact, i: int, j: int, x0: wp.array[wp.vec3]) -> float:
 
 
 @wp.func
+def crossing_of(
+    among: wp.vec2i,  # first and end of the triangles to look at
+    tri: wp.array[int],
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+    q: wp.vec3,
+) -> Crossing:
+    """First entering crossing of pq and the first leaving one after it."""
+    out = no_crossing()
+    for k in range(among[0], among[1]):
+        t = tris[tri[k]]
+        a = x[t[0]]
+        n = wp.cross(x[t[1]] - a, x[t[2]] - a)
+        if wp.dot(n, p - a) * wp.dot(n, q - a) <= 0.0:  # most lie on one side
+            out = with_tri(out, tri[k], tris, x, p, q - p)
+    if starts_inside(out):
+        rest = no_crossing()
+        start = out.enter.t
+        inner = p + start * (q - p)
+        for k in range(among[0], among[1]):
+            if tri[k] != out.enter.tri:
+                rest = with_tri(rest, tri[k], tris, x, inner, q - inner)
+        out.leave = rest.leave
+        out.leave.t = start + (1.0 - start) * rest.leave.t
+    return out
+
+
+@wp.func
+def closest_of(
+    surface: wp.uint64,
+    body: int,
+    sure: float,  # what is closer than this is among the triangles [m]
+    reach: float,  # where the search in the whole surface starts [m]
+    among: wp.vec2i,
+    tri: wp.array[int],
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+) -> Hit:
+    """Closest point of the body's surface."""
+    best = Hit()
+    best.tri = -1
+    best.t = NONE
+    for k in range(among[0], among[1]):
+        best = closer(best, tri[k], tris, x, p)
+    if best.t <= sure:
+        return best
+    return closest_hit(surface, body, tris, x, p, reach)
+
+
+@wp.func
 def edge_contact(
     surface: wp.uint64,
     body: int,
     edge: float,  # mean edge of the body [m]
     fresh: bool,  # there are no overlaps from before the step
+    skin: float,  # of the candidates [m]
+    among: wp.vec2i,  # first and end of its triangles that the edge may cross
+    tri: wp.array[int],
     tris: wp.array[wp.vec3i],
     x0: wp.array[wp.vec3],
     x: wp.array[wp.vec3],
@@ -130,14 +195,15 @@ def edge_contact(
     p = x[i]
     q = x[j]
     reach = 0.1 * edge
+    sure = SURE * skin
     out = EdgeContact()
-    crossing = first_crossing(surface, body, tris, x, p, q - p)
+    crossing = crossing_of(among, tri, tris, x, p, q)
     enter = crossing.enter
     leave = crossing.leave
     if enter.tri >= 0 and leave.tri >= 0:
         t = 0.5 * (enter.t + leave.t)
         middle = p + t * (q - p)
-        hit = closest_hit(surface, body, tris, x, middle, reach)
+        hit = closest_of(surface, body, sure, reach, among, tri, tris, x, middle)
         contact = on_ridge(p, q, tris[enter.tri], tris[leave.tri], x)
         if contact.found and contact.d <= 2.0 * hit.t:
             if not fresh or start_gap(contact, i, j, x0) > -STALE * edge:
@@ -149,85 +215,64 @@ def edge_contact(
         if hit.tri >= 0 and hit.t > FLAT * edge:
             return on_face(middle, t, hit, tris, x)
     elif enter.tri >= 0:
-        hit = closest_hit(surface, body, tris, x, q, reach)
+        hit = closest_of(surface, body, sure, reach, among, tri, tris, x, q)
         if hit.tri >= 0:
             out = on_ridge(p, q, tris[enter.tri], tris[hit.tri], x)
     elif leave.tri >= 0:
-        hit = closest_hit(surface, body, tris, x, p, reach)
+        hit = closest_of(surface, body, sure, reach, among, tri, tris, x, p)
         if hit.tri >= 0:
             out = on_ridge(p, q, tris[hit.tri], tris[leave.tri], x)
-    out.close = crossing.close
     return out
 
 
 @wp.kernel
-def count_crossings(
+def find_crossings(
     # in
-    edge_slots: int,  # of each edge
     fresh: bool,  # there are no overlaps from before the step
-    again: bool,  # the second time in a step: only edges that were close the first time
+    skin: wp.array[float],  # (1,) [m]
+    n_pair: wp.array[int],  # (1,)
+    pair: wp.array[wp.vec2i],  # (capacity,) edge and body
+    pair_tris: wp.array[wp.vec2i],  # (capacity,) first and end in ``tri``
+    tri: wp.array[int],  # (capacity,)
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     edges: wp.array[wp.vec4i],  # (n_edge,)
-    vert_body: wp.array[int],  # (n_vert,)
     body_edge: wp.array[float],  # (n_body,) [m]
-    n_near: wp.array[int],  # (n_body,)
-    near: wp.array2d[int],  # (n_body, capacity)
-    lower: wp.array[wp.vec3],  # (n_body,) [m]
-    upper: wp.array[wp.vec3],  # (n_body,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # in, out
-    edge_close: wp.array[int],  # (n_edge,) 1 where a triangle's box was met
     # out
-    count: wp.array[int],  # (n_edge + 1,)
-    edge_body: wp.array2d[int],  # (n_edge, edge_slots)
-    # out, added to
-    needed: wp.array[int],  # edge slots that would have been enough
+    crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact
 ):
-    """One thread per surface edge: the near bodies that it crosses."""
-    e = wp.tid()
-    m = vert_body[edges[e][0]]
-    n = int(0)
-    near_count = n_near[m]
-    if again and edge_close[e] == 0:
-        near_count = 0
-    if near_count > 0:
-        i = edges[e][0]
-        j = edges[e][1]
-        p = x[i]
-        q = x[j]
-        close = bool(False)
-        for k in range(near_count):
-            body = near[m, k]
-            if boxes_meet(wp.min(p, q), wp.max(p, q), lower[body], upper[body]):
-                edge = body_edge[body]
-                contact = edge_contact(surface, body, edge, fresh, tris, x0, x, i, j)
-                close = close or contact.close or contact.found
-                if contact.found:
-                    if n < edge_slots:
-                        edge_body[e, n] = body
-                    n += 1
-        edge_close[e] = int(close)
-    elif not again:
-        edge_close[e] = 0
-    if n > edge_slots:
-        wp.atomic_max(needed, 0, n)
-    count[e] = wp.min(n, edge_slots)
+    """One thread per candidate, and one more for the end of the list."""
+    c = wp.tid()
+    crossing[c] = 0
+    if c >= n_pair[0]:
+        return
+    e = edges[pair[c][0]]
+    body = pair[c][1]
+    edge = body_edge[body]
+    found = edge_contact(
+        surface, body, edge, fresh, skin[0], pair_tris[c], tri, tris, x0, x, e[0], e[1]
+    )
+    if found.found:
+        crossing[c] = 1
 
 
 @wp.kernel
 def edge_contacts(
     # in
     fresh: bool,  # there are no overlaps from before the step
+    skin: wp.array[float],  # (1,) [m]
+    pair: wp.array[wp.vec2i],  # (capacity,) edge and body
+    pair_tris: wp.array[wp.vec2i],  # (capacity,) first and end in ``tri``
+    tri: wp.array[int],  # (capacity,)
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     edges: wp.array[wp.vec4i],  # (n_edge,)
     vert_body: wp.array[int],  # (n_vert,)
     body_edge: wp.array[float],  # (n_body,) [m]
-    hit_start: wp.array[int],  # (n_vert + 1,)
-    edge_start: wp.array[int],  # (n_edge + 1,)
-    edge_body: wp.array2d[int],  # (n_edge, edge_slots)
+    n_hit: wp.array[int],  # (1,)
+    crossing_at: wp.array[int],  # (capacity + 1,) contacts before each candidate
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step, for the weights
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
@@ -236,42 +281,42 @@ def edge_contacts(
     normal: wp.array[wp.vec3],  # (capacity,)
     depth: wp.array[float],  # (capacity,) [m]
     offset: wp.array[float],  # (capacity,) [m] gap = (sum coef x) . normal - offset
-    pair: wp.array[wp.vec2i],  # (capacity,)
+    pair_of: wp.array[wp.vec2i],  # (capacity,)
 ):
-    """One thread per surface edge: its contacts, behind those of the vertices."""
-    e = wp.tid()
-    for s in range(edge_start[e + 1] - edge_start[e]):
-        c = hit_start[hit_start.shape[0] - 1] + edge_start[e] + s
-        if c >= normal.shape[0]:
-            return
-        body = edge_body[e, s]
-        i = edges[e][0]
-        j = edges[e][1]
-        found = edge_contact(surface, body, body_edge[body], fresh, tris, x0, x, i, j)
-        t = found.vert
-        w = found.w
-        if found.ridge:
-            su = wp.vec2(found.t, w[1])
-            start = projected_crossing(x0[i], x0[j], x0[t[0]], x0[t[1]], found.n)
-            if wp.length(start - su) < SLIP:
-                found.t = start[0]
-                w = wp.vec3(1.0 - start[1], start[1], 0.0)
-        else:
-            middle = x0[i] + found.t * (x0[j] - x0[i])
-            start_w = projected_weights(middle, found.n, x0[t[0]], x0[t[1]], x0[t[2]])
-            if wp.length(start_w - w) < SLIP:
-                w = start_w
-        vert[c, 0] = i
-        vert[c, 1] = j
-        vert[c, 2] = t[0]
-        vert[c, 3] = t[1]
-        vert[c, 4] = t[2]
-        coef[c, 0] = 1.0 - found.t
-        coef[c, 1] = found.t
-        coef[c, 2] = -w[0]
-        coef[c, 3] = -w[1]
-        coef[c, 4] = -w[2]
-        normal[c] = found.n
-        depth[c] = found.d
-        offset[c] = 0.0
-        pair[c] = wp.vec2i(vert_body[i], body)
+    """One thread per candidate: its contact, behind those of the vertices."""
+    k = wp.tid()
+    c = n_hit[0] + crossing_at[k]
+    if crossing_at[k + 1] == crossing_at[k] or c >= normal.shape[0]:
+        return
+    i = edges[pair[k][0]][0]
+    j = edges[pair[k][0]][1]
+    body = pair[k][1]
+    edge = body_edge[body]
+    found = edge_contact(surface, body, edge, fresh, skin[0], pair_tris[k], tri, tris, x0, x, i, j)
+    t = found.vert
+    w = found.w
+    if found.ridge:
+        su = wp.vec2(found.t, w[1])
+        start = projected_crossing(x0[i], x0[j], x0[t[0]], x0[t[1]], found.n)
+        if wp.length(start - su) < SLIP:
+            found.t = start[0]
+            w = wp.vec3(1.0 - start[1], start[1], 0.0)
+    else:
+        middle = x0[i] + found.t * (x0[j] - x0[i])
+        start_w = projected_weights(middle, found.n, x0[t[0]], x0[t[1]], x0[t[2]])
+        if wp.length(start_w - w) < SLIP:
+            w = start_w
+    vert[c, 0] = i
+    vert[c, 1] = j
+    vert[c, 2] = t[0]
+    vert[c, 3] = t[1]
+    vert[c, 4] = t[2]
+    coef[c, 0] = 1.0 - found.t
+    coef[c, 1] = found.t
+    coef[c, 2] = -w[0]
+    coef[c, 3] = -w[1]
+    coef[c, 4] = -w[2]
+    normal[c] = found.n
+    depth[c] = found.d
+    offset[c] = 0.0
+    pair_of[c] = wp.vec2i(vert_body[i], body)

@@ -1,21 +1,20 @@
-"""Stage 1: which vertices lie inside tets of other bodies, by spatial hashing.
+"""Stage 1: which vertices may come to lie inside which tets of other bodies, by spatial hashing.
 
 Teschner et al. 2003: cell (i, j, k) = floor(x / l), l the mean edge length, and
-hash = (i 73856093 xor j 19349663 xor k 83492791) mod n. Vertices are inserted by a counting sort,
-with their true cell, so that a collision of hashes costs a comparison and nothing else. Each tet
-then visits the cells that it shares with the box of each near body. A vertex keeps the ids of
-the bodies it is inside of in a few slots, sorted afterwards: the order of threads leaves no trace.
+hash = (i 73856093 xor j 19349663 xor k 83492791) mod n, here with the body mixed in: a tet looks
+for the vertices of one near body at a time. Vertices are inserted by a counting sort, with their
+true cell, so that a collision of hashes costs a comparison and nothing else. Each tet then visits
+the cells around it. What it finds within two skins (candidates.py) is sorted by pairs.py. A
+half-space counts as a body with one tet.
 """
 
 import warp as wp
 
-from warp_contact.kernels.geometry import boxes_meet, in_box, tet_weights
+from warp_contact.kernels.geometry import boxes_meet, in_box
+from warp_contact.kernels.near import MANY, Near, next_near, part, reaches
+from warp_contact.kernels.pairs import append
 
 wp.set_module_options({"enable_backward": False})
-
-# A vertex this little outside of a tet, in barycentric weights, counts as inside: where two rims
-# lie flush, rounding would else let corners slip past each other. Less than the resting gap.
-SKIN = wp.constant(0.0)
 
 
 @wp.func
@@ -26,12 +25,12 @@ def cell_of(x: wp.vec3, size: float) -> wp.vec3i:
 
 
 @wp.func
-def hash_of(cell: wp.vec3i, world: int, n: int) -> int:
-    """Hash of a cell; worlds are mixed in so that copies of a scene do not share cells."""
+def hash_of(cell: wp.vec3i, body: int, n: int) -> int:
+    """Hash of a cell and a body: a tet looks for the vertices of one near body at a time."""
     h = wp.uint32(cell[0]) * wp.uint32(73856093)
     h = h ^ (wp.uint32(cell[1]) * wp.uint32(19349663))
     h = h ^ (wp.uint32(cell[2]) * wp.uint32(83492791))
-    h = h ^ (wp.uint32(world) * wp.uint32(97531))
+    h = h ^ (wp.uint32(body) * wp.uint32(97531))
     return int(h % wp.uint32(n))
 
 
@@ -39,15 +38,12 @@ def hash_of(cell: wp.vec3i, world: int, n: int) -> int:
 def count_cells(
     # in
     size: float,  # edge of a cell [m]
+    skin: wp.array[float],  # (1,) [m]
     vert_body: wp.array[int],  # (n_vert,)
-    world: wp.array[int],  # (n_body,)
-    n_near: wp.array[int],  # (n_body,)
-    near: wp.array2d[int],  # (n_body, capacity)
-    lower: wp.array[wp.vec3],  # (n_body,) [m]
-    upper: wp.array[wp.vec3],  # (n_body,) [m]
+    of: Near,
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
-    key: wp.array[int],  # (n_vert,), -1 for a vertex that is in no other body's box
+    key: wp.array[int],  # (n_vert,), -1 for a vertex that no other body may touch
     # out, added to
     count: wp.array[int],  # (n_cell + 1,)
 ):
@@ -55,12 +51,10 @@ def count_cells(
     i = wp.tid()
     m = vert_body[i]
     key[i] = -1
-    for k in range(n_near[m]):
-        if in_box(x[i], lower[near[m, k]], upper[near[m, k]]):
-            h = hash_of(cell_of(x[i], size), world[m], count.shape[0] - 1)
-            key[i] = h
-            wp.atomic_add(count, h, 1)
-            return
+    if next_near(m, -1, part(x[i], x[i], x[i], x[i], skin[0]), of) >= 0:
+        h = hash_of(cell_of(x[i], size), m, count.shape[0] - 1)
+        key[i] = h
+        wp.atomic_add(count, h, 1)
 
 
 @wp.kernel
@@ -79,136 +73,131 @@ def fill_cells(
 
 
 @wp.func
-def enter(i: int, body: int, slots: int, inside: wp.array[int], needed: wp.array[int]):
-    """Note that vertex i is inside a body, once."""
-    for k in range(slots):
-        seen = wp.atomic_cas(inside, slots * i + k, -1, body)
-        if seen == -1 or seen == body:
-            return
-    wp.atomic_max(needed, 0, slots + 1)
+def beyond(axis: wp.vec3, x: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3, reach: float) -> bool:
+    """Whether x is further than the reach from the tet 0bcd along the axis."""
+    sb = wp.dot(axis, b)
+    sc = wp.dot(axis, c)
+    sd = wp.dot(axis, d)
+    s = wp.dot(axis, x)
+    lo = wp.min(wp.min(sb, sc), wp.min(sd, 0.0))
+    hi = wp.max(wp.max(sb, sc), wp.max(sd, 0.0))
+    return wp.max(s - hi, lo - s) > reach * wp.length(axis)
 
 
-@wp.kernel
-def find_inside(
-    # in
-    size: float,  # edge of a cell [m]
-    slots: int,  # of each vertex
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    vert_body: wp.array[int],  # (n_vert,)
-    world: wp.array[int],  # (n_body,)
-    n_near: wp.array[int],  # (n_body,)
-    near: wp.array2d[int],  # (n_body, capacity)
-    lower: wp.array[wp.vec3],  # (n_body,) [m]
-    upper: wp.array[wp.vec3],  # (n_body,) [m]
-    cell_start: wp.array[int],  # (n_cell + 1,)
-    cell_vert: wp.array[int],  # (n_vert,)
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # in, out
-    inside: wp.array[int],  # (n_vert * slots,) bodies, -1 where free
-    needed: wp.array[int],  # slots that would have been enough
+@wp.func
+def may_hold(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3, reach: float) -> bool:
+    """Whether no face of the tet, upright or inverted, keeps x further away than the reach."""
+    r = x - a
+    e1 = b - a
+    e2 = c - a
+    e3 = d - a
+    if beyond(wp.cross(e1, e2), r, e1, e2, e3, reach):
+        return False
+    if beyond(wp.cross(e2, e3), r, e1, e2, e3, reach):
+        return False
+    if beyond(wp.cross(e3, e1), r, e1, e2, e3, reach):
+        return False
+    return not beyond(wp.cross(e2 - e1, e3 - e1), r, e1, e2, e3, reach)
+
+
+@wp.func
+def visit_cells(
+    q: int,
+    m: int,
+    size: float,
+    lo: wp.vec3,
+    hi: wp.vec3,
+    reach: float,
+    tets: wp.array[wp.vec4i],
+    vert_body: wp.array[int],
+    cell_start: wp.array[int],
+    cell_vert: wp.array[int],
+    x: wp.array[wp.vec3],
+    found: wp.array[wp.vec2i],
+    n_found: wp.array[int],
 ):
-    """One thread per tet: enter its body into the slots of the vertices it holds."""
-    q = wp.tid()
-    body = vert_body[tets[q][0]]
-    if n_near[body] == 0:
-        return
+    """Append the vertices of body m in the box from lo to hi that tet q may come to hold."""
     a = x[tets[q][0]]
     b = x[tets[q][1]]
     c = x[tets[q][2]]
     d = x[tets[q][3]]
-    tlo = wp.min(wp.min(a, b), wp.min(c, d))
-    thi = wp.max(wp.max(a, b), wp.max(c, d))
-    for k in range(n_near[body]):
-        m = near[body, k]
-        if boxes_meet(tlo, thi, lower[m], upper[m]):
-            first = cell_of(wp.max(tlo, lower[m]), size)
-            last = cell_of(wp.min(thi, upper[m]), size)
-            for ci in range(first[0], last[0] + 1):
-                for cj in range(first[1], last[1] + 1):
-                    for ck in range(first[2], last[2] + 1):
-                        cell = wp.vec3i(ci, cj, ck)
-                        h = hash_of(cell, world[body], cell_start.shape[0] - 1)
-                        for e in range(cell_start[h], cell_start[h + 1]):
-                            i = cell_vert[e]
-                            if vert_body[i] == m and in_box(x[i], tlo, thi):
-                                if cell_of(x[i], size) == cell:
-                                    w = tet_weights(x[i], a, b, c, d)
-                                    if wp.min(w) >= -SKIN:
-                                        enter(i, body, slots, inside, needed)
-
-
-@wp.func
-def is_inside(i: int, body: int, slots: int, inside: wp.array[int]) -> bool:
-    for k in range(slots):
-        if inside[slots * i + k] == body:
-            return True
-    return False
+    first = cell_of(lo, size)
+    last = cell_of(hi, size)
+    for ci in range(first[0], last[0] + 1):
+        for cj in range(first[1], last[1] + 1):
+            for ck in range(first[2], last[2] + 1):
+                cell = wp.vec3i(ci, cj, ck)
+                h = hash_of(cell, m, cell_start.shape[0] - 1)
+                for e in range(cell_start[h], cell_start[h + 1]):
+                    i = cell_vert[e]
+                    if vert_body[i] == m and in_box(x[i], lo, hi):
+                        if cell_of(x[i], size) == cell and may_hold(x[i], a, b, c, d, reach):
+                            append(i, q, found, n_found)
 
 
 @wp.kernel
-def count_hits(
+def visit_tets(
     # in
-    slots: int,  # of each vertex
-    on_surface: wp.array[int],  # (n_vert,)
-    plane_n: wp.array[wp.vec3],  # (n_plane,)
-    plane_h: wp.array[float],  # (n_plane,) [m]
+    size: float,  # edge of a cell [m]
+    skin: wp.array[float],  # (1,) [m]
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    vert_body: wp.array[int],  # (n_vert,)
+    of: Near,
+    cell_start: wp.array[int],  # (n_cell + 1,)
+    cell_vert: wp.array[int],  # (n_vert,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # in, out
-    inside: wp.array[int],  # (n_vert * slots,) sorted on return, free slots last
     # out
-    count: wp.array[int],  # (n_vert + 1,)
+    found: wp.array[wp.vec2i],  # (capacity,) vertex and tet
+    # out, added to
+    n_found: wp.array[int],  # (1,)
 ):
-    """One thread per vertex: sort its slots, count its bodies and the planes it is below of."""
-    i = wp.tid()
-    n = int(0)
-    for k in range(slots):
-        body = inside[slots * i + k]
-        if body >= 0:
-            j = int(n)
-            while j > 0 and inside[slots * i + wp.max(j - 1, 0)] > body:
-                inside[slots * i + j] = inside[slots * i + j - 1]
-                j -= 1
-            inside[slots * i + j] = body
-            n += 1
-    if on_surface[i] == 1:
-        for p in range(plane_n.shape[0]):
-            if wp.dot(plane_n[p], x[i]) < plane_h[p]:
-                n += 1
-    count[i] = n
-
-
-@wp.kernel
-def list_hits(
-    # in
-    slots: int,  # of each vertex
-    n_body: int,
-    on_surface: wp.array[int],  # (n_vert,)
-    plane_n: wp.array[wp.vec3],  # (n_plane,)
-    plane_h: wp.array[float],  # (n_plane,) [m]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    inside: wp.array[int],  # (n_vert * slots,)
-    hit_start: wp.array[int],  # (n_vert + 1,)
-    # out
-    hit_vert: wp.array[int],  # (capacity,)
-    hit_body: wp.array[int],  # (capacity,) n_body + p for plane p
-    hit_layer: wp.array[int],  # (capacity,) -1: no depth yet
-):
-    """One thread per vertex: write its hits, bodies in ascending order, then planes."""
-    i = wp.tid()
-    e = hit_start[i]
-    last = wp.min(hit_start[i + 1], hit_vert.shape[0])
-    if e >= last:
+    """One thread per tet: the vertices of other bodies that it may come to hold."""
+    q = wp.tid()
+    m = vert_body[tets[q][0]]
+    if of.n_near[m] == 0:
         return
-    for k in range(slots):
-        if e < last and inside[slots * i + k] >= 0:
-            hit_vert[e] = i
-            hit_body[e] = inside[slots * i + k]
-            hit_layer[e] = -1
-            e += 1
-    if on_surface[i] == 1:
-        for p in range(plane_n.shape[0]):
-            if e < last and wp.dot(plane_n[p], x[i]) < plane_h[p]:
-                hit_vert[e] = i
-                hit_body[e] = n_body + p
-                hit_layer[e] = 0
-                e += 1
+    own = part(x[tets[q][0]], x[tets[q][1]], x[tets[q][2]], x[tets[q][3]], skin[0])
+    reach = 2.0 * skin[0]
+    grow = wp.vec3(skin[0], skin[0], skin[0])
+    if of.n_near[m] <= MANY:
+        for k in range(of.n_near[m]):
+            if reaches(own, of.slab[m, k]):
+                if boxes_meet(own.lo, own.hi, of.vert_lower[m, k], of.vert_upper[m, k]):
+                    lo = wp.max(own.lo - grow, of.vert_lower[m, k])
+                    hi = wp.min(own.hi + grow, of.vert_upper[m, k])
+                    body = of.near[m, k]
+                    visit_cells(
+                        q, body, size, lo, hi, reach, tets, vert_body, cell_start, cell_vert,
+                        x, found, n_found
+                    )  # fmt: skip
+    else:
+        body = next_near(m, -1, own, of)
+        while body >= 0:
+            lo = wp.max(own.lo - grow, of.lower[body])
+            hi = wp.min(own.hi + grow, of.upper[body])
+            visit_cells(
+                q, body, size, lo, hi, reach, tets, vert_body, cell_start, cell_vert,
+                x, found, n_found
+            )  # fmt: skip
+            body = next_near(m, body, own, of)
+
+
+@wp.kernel
+def visit_planes(
+    # in
+    n_tet: int,
+    skin: wp.array[float],  # (1,) [m]
+    surf: wp.array[int],  # (n_surf,)
+    plane_n: wp.array[wp.vec3],  # (n_plane,)
+    plane_h: wp.array[float],  # (n_plane,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    found: wp.array[wp.vec2i],  # (capacity,) vertex and n_tet + p for plane p
+    # out, added to
+    n_found: wp.array[int],  # (1,)
+):
+    """One thread per surface vertex: the planes that it may come to pass."""
+    i = surf[wp.tid()]
+    for p in range(plane_n.shape[0]):
+        if wp.dot(plane_n[p], x[i]) < plane_h[p] + skin[0]:
+            append(i, n_tet + p, found, n_found)

@@ -135,7 +135,7 @@ def solve_contacts(
     slip: wp.array[wp.vec3],  # (capacity,) [N s] accumulated friction impulse
     ahead: wp.array[wp.vec4],  # (capacity,) [N s] extrapolated friction and normal impulse, in v
     # out
-    change: wp.array[wp.vec3],  # (capacity,) [N s] what this sweep adds
+    part: wp.array[wp.vec3],  # (5 capacity,) [N s] what this sweep adds at each vertex
     # out, added to
     again: wp.array[int],  # (1,) 1 when another sweep is needed
 ):
@@ -144,7 +144,8 @@ def solve_contacts(
     if c >= n_contact[0]:
         return
     if weight[c] == 0.0:
-        change[c] = wp.vec3(0.0, 0.0, 0.0)
+        for k in range(5):
+            part[5 * c + k] = wp.vec3(0.0, 0.0, 0.0)
         return
     n = normal[c]
     u = wp.vec3(0.0, 0.0, 0.0)
@@ -170,7 +171,9 @@ def solve_contacts(
         beta = 0.0
     next_lam = new_lam + beta * (new_lam - lam[c])
     next_slip = new_slip + beta * (new_slip - slip[c])
-    change[c] = (next_lam - y[3]) * n + next_slip - yt
+    change = (next_lam - y[3]) * n + next_slip - yt
+    for k in range(5):
+        part[5 * c + k] = coef[c, k] * change + open[c] * wp.dot(turn[c, k], change) * n
     ahead[c] = wp.vec4(next_slip[0], next_slip[1], next_slip[2], next_lam)
     lam[c] = new_lam
     slip[c] = new_slip
@@ -181,11 +184,7 @@ def apply_impulses(
     # in
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
-    coef: wp.array2d[float],  # (capacity, 5)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    open: wp.array[float],  # (capacity,) [m]
-    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
-    change: wp.array[wp.vec3],  # (capacity,) [N s]
+    part: wp.array[wp.vec3],  # (5 capacity,) [N s]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
     # in, out
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
@@ -197,8 +196,6 @@ def apply_impulses(
         return
     p = wp.vec3(0.0, 0.0, 0.0)
     for e in range(start[i], start[i + 1]):
-        c = entry[e] // 5
-        k = entry[e] - 5 * c
-        p += coef[c, k] * change[c] + open[c] * wp.dot(turn[c, k], change[c]) * normal[c]
+        p += part[entry[e]]
     v[i] = v[i] + inv_mass[i] * p
     impulse[i] = impulse[i] + p

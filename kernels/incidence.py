@@ -94,3 +94,23 @@ def sort_entries(
             entry[k] = entry[k - 1]
             k -= 1
         entry[k] = value
+
+
+@wp.kernel
+def add_parts(
+    # in
+    start: wp.array[int],  # (n_vert + 1,)
+    entry: wp.array[int],  # (5 capacity,)
+    part: wp.array[wp.vec3],  # (5 capacity,) [kg y]
+    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    # in, out
+    y: wp.array[wp.vec3],  # (n_vert,) positions or velocities
+):
+    """One thread per vertex: gather the parts of its contacts in their order."""
+    i = wp.tid()
+    if start[i] == start[i + 1] or inv_mass[i] == 0.0:
+        return
+    p = wp.vec3(0.0, 0.0, 0.0)
+    for e in range(start[i], start[i + 1]):
+        p += part[entry[e]]
+    y[i] = y[i] + inv_mass[i] * p

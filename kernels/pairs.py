@@ -1,7 +1,7 @@
-"""The contact force between two bodies: impulses summed over a frame, in any order.
+"""Candidates by pair: of a vertex and a body with tets of it, of an edge and one with triangles.
 
-Threads race for the slots of a table and for its sums. Impulses are added as integers, whose sum
-has no order, so the result repeats bit for bit.
+Threads append (owner, item) in any order. A counting sort by owner and a sort of each owner's items
+leave no trace of that order. Items are numbered by body, so that those of a pair follow each other.
 """
 
 import warp as wp
@@ -9,43 +9,105 @@ import warp as wp
 wp.set_module_options({"enable_backward": False})
 
 
+@wp.func
+def append(owner: int, item: int, found: wp.array[wp.vec2i], n_found: wp.array[int]):
+    """Add to a list; what does not fit is counted all the same."""
+    k = wp.atomic_add(n_found, 0, 1)
+    if k < found.shape[0]:
+        found[k] = wp.vec2i(owner, item)
+
+
 @wp.kernel
-def add_pair_impulses(
+def count_items(
     # in
-    unit: float,  # momentum of one count [N s]
-    n_contact: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    lam: wp.array[float],  # (capacity,) [N s]
-    slip: wp.array[wp.vec3],  # (capacity,) [N s]
-    # in, out
-    key: wp.array[wp.int64],  # (n_pair,) lower body * 2^32 + upper body, -1 where free
-    total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
-    needed: wp.array[int],  # (1,) pairs that would have been enough
+    n_found: wp.array[int],  # (1,)
+    found: wp.array[wp.vec2i],  # (capacity,) owner and item
+    # out, added to
+    count: wp.array[int],  # (n_owner + 1,)
+    needed: wp.array[int],  # (1,) largest number of items that did not fit
 ):
-    """One thread per contact: add to its pair, as integers, whose sum has no order."""
-    c = wp.tid()
-    if c >= n_contact[0] or lam[c] <= 0.0:
+    """One thread per item; none is counted when they do not fit."""
+    k = wp.tid()
+    if n_found[0] > found.shape[0]:
+        wp.atomic_max(needed, 0, n_found[0])
+    elif k < n_found[0]:
+        wp.atomic_add(count, found[k][0], 1)
+
+
+@wp.kernel
+def fill_items(
+    # in
+    n_found: wp.array[int],  # (1,)
+    found: wp.array[wp.vec2i],  # (capacity,)
+    # in, out
+    start: wp.array[int],  # (n_owner + 1,) ends of the lists in, their starts out
+    # out
+    item: wp.array[int],  # (capacity,) by owner, unsorted
+):
+    """One thread per item."""
+    k = wp.tid()
+    if k < n_found[0] and n_found[0] <= found.shape[0]:
+        item[wp.atomic_sub(start, found[k][0], 1) - 1] = found[k][1]
+
+
+@wp.kernel
+def count_pairs(
+    # in
+    item_body: wp.array[int],  # (n,)
+    start: wp.array[int],  # (n_owner + 1,)
+    # in, out
+    item: wp.array[int],  # (capacity,) sorted on return
+    # out
+    count: wp.array[int],  # (n_owner + 1,)
+):
+    """One thread per owner: sort its items and count their bodies."""
+    i = wp.tid()
+    n = int(0)
+    body = int(-1)
+    for e in range(start[i], start[i + 1]):
+        value = item[e]
+        k = int(e)
+        while k > start[i] and item[wp.max(k - 1, 0)] > value:
+            item[k] = item[k - 1]
+            k -= 1
+        item[k] = value
+    for e in range(start[i], start[i + 1]):
+        if item_body[item[e]] != body:
+            body = item_body[item[e]]
+            n += 1
+    count[i] = n
+
+
+@wp.kernel
+def list_pairs(
+    # in
+    item_body: wp.array[int],  # (n,)
+    start: wp.array[int],  # (n_owner + 1,)
+    item: wp.array[int],  # (capacity,)
+    pair_start: wp.array[int],  # (n_owner + 1,)
+    # out
+    n_pair: wp.array[int],  # (1,) 0 when they do not fit
+    pair: wp.array[wp.vec2i],  # (capacity,) owner and body
+    items: wp.array[wp.vec2i],  # (capacity,) first and end in ``item``
+    # out, added to
+    needed: wp.array[int],  # (1,) largest number of pairs that did not fit
+):
+    """One thread per owner: its pairs, bodies in ascending order."""
+    i = wp.tid()
+    total = pair_start[pair_start.shape[0] - 1]
+    if total > pair.shape[0]:
+        n_pair[0] = 0
+        wp.atomic_max(needed, 0, total)
         return
-    p = lam[c] * normal[c] + slip[c]
-    lo = pair[c][0]
-    hi = pair[c][1]
-    if lo > hi:
-        lo = pair[c][1]
-        hi = pair[c][0]
-        p = -p
-    name = (wp.int64(lo) << wp.int64(32)) | wp.int64(hi)
-    n = key.shape[0]
-    slot = int(
-        (wp.uint32(lo) * wp.uint32(73856093) ^ wp.uint32(hi) * wp.uint32(19349663)) % wp.uint32(n)
-    )
-    for _probe in range(n):
-        seen = wp.atomic_cas(key, slot, wp.int64(-1), name)
-        if seen == wp.int64(-1) or seen == name:
-            for k in range(3):
-                wp.atomic_add(
-                    total, slot, k, wp.int64(wp.round(wp.float64(p[k]) / wp.float64(unit)))
-                )
-            return
-        slot = (slot + 1) % n
-    wp.atomic_max(needed, 0, n + 1)
+    n_pair[0] = total
+    c = pair_start[i]
+    first = start[i]
+    while first < start[i + 1]:
+        body = item_body[item[first]]
+        end = int(first)
+        while end < start[i + 1] and item_body[item[wp.min(end, item.shape[0] - 1)]] == body:
+            end += 1
+        pair[c] = wp.vec2i(i, body)
+        items[c] = wp.vec2i(first, end)
+        c += 1
+        first = end

@@ -26,11 +26,13 @@ def penalty_impulses(
     normal: wp.array[wp.vec3],  # (capacity,)
     depth: wp.array[float],  # (capacity,) [m]
     weight: wp.array[float],  # (capacity,) [1/kg]
+    open: wp.array[float],  # (capacity,) [m]
+    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
     lam: wp.array[float],  # (capacity,) [N s]
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
-    change: wp.array[wp.vec3],  # (capacity,) [N s]
+    part: wp.array[wp.vec3],  # (5 capacity,) [N s] its part at each vertex
 ):
     """One thread per contact: the impulse of the penalty force over one step."""
     c = wp.tid()
@@ -48,4 +50,6 @@ def penalty_impulses(
     if active > 0.0 and weight[c] > 0.0:
         lam[c] = dt[0] * wp.max(stiffness * depth[c] - damping * un, 0.0)
         slip[c] = clamped(-(u - un * n) / weight[c], mu * lam[c])
-    change[c] = lam[c] * n + slip[c]
+    p = lam[c] * n + slip[c]
+    for k in range(5):
+        part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n

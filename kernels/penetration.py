@@ -27,7 +27,7 @@ momentum is kept, since L = sum m x0 x v for symplectic Euler.
 import warp as wp
 
 from warp_contact.kernels.geometry import projected_weights
-from warp_contact.kernels.hashing import is_inside
+from warp_contact.kernels.hits import hit_range, is_hit
 from warp_contact.kernels.surface_query import (
     Hit,
     closest_hit,
@@ -42,6 +42,7 @@ wp.set_module_options({"enable_backward": False})
 SLIP = wp.constant(1.0)  # change of the weights in a step above which they are taken at its end
 STALE = wp.constant(0.02)  # of an edge: overlap at the start of a step that tells a wrong direction
 FLUSH = wp.constant(1.0e-5)  # of an edge: a vertex this deep lies in the surface
+GRAZING = wp.constant(5.0e-3)  # sine below which a tet edge lies in a wall and does not cross it
 FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
 
 
@@ -49,16 +50,15 @@ FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not tru
 def border_depth(
     # in
     n_body: int,
-    slots: int,  # of each vertex
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     vs_start: wp.array[int],  # (n_vert + 1,)
     vs_tri: wp.array[int],  # (3 n_tri,)
     vn_start: wp.array[int],  # (n_vert + 1,)
     vn_vert: wp.array[int],  # (2 n_edge of the tets,)
-    inside: wp.array[int],  # (n_vert * slots,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    hit_start: wp.array[int],  # (n_vert + 1,)
+    pair_start: wp.array[int],  # (n_vert + 1,) candidates of each vertex
+    hit_at: wp.array[int],  # (n_pair + 1,) hits before each candidate
     hit_vert: wp.array[int],  # (capacity,)
     hit_body: wp.array[int],  # (capacity,)
     # out
@@ -70,7 +70,7 @@ def border_depth(
 ):
     """One thread per hit: depth and direction from the crossing tet edges."""
     e = wp.tid()
-    if e >= wp.min(hit_start[hit_start.shape[0] - 1], hit_vert.shape[0]):
+    if e >= wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]):
         return
     i = hit_vert[e]
     body = hit_body[e]
@@ -82,9 +82,9 @@ def border_depth(
     r = wp.vec3(0.0, 0.0, 0.0)
     for k in range(vn_start[i], vn_start[i + 1]):
         j = vn_vert[k]
-        if not is_inside(j, body, slots, inside):
+        if not is_hit(j, body, pair_start, hit_at, hit_body):
             u = p - x[j]
-            hit = first_hit(surface, body, tris, x, x[j], u, -1.0e-6, -1.0)
+            hit = first_hit(surface, body, tris, x, x[j], u, -1.0e-6, -1.0, GRAZING)
             if hit.tri >= 0:
                 n = hit_normal(hit, tris, vs_start, vs_tri, x)
                 gap = hit_point(hit, tris, x) - p
@@ -121,7 +121,8 @@ def propagate(
     vn_start: wp.array[int],  # (n_vert + 1,)
     vn_vert: wp.array[int],  # (2 n_edge of the tets,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    hit_start: wp.array[int],  # (n_vert + 1,)
+    pair_start: wp.array[int],  # (n_vert + 1,) candidates of each vertex
+    hit_at: wp.array[int],  # (n_pair + 1,) hits before each candidate
     hit_vert: wp.array[int],  # (capacity,)
     hit_body: wp.array[int],  # (capacity,)
     # in, out
@@ -132,8 +133,7 @@ def propagate(
 ):
     """One thread per hit without depth: take it over from neighbours of earlier layers."""
     e = wp.tid()
-    count = wp.min(hit_start[hit_start.shape[0] - 1], hit_vert.shape[0])
-    if e >= count or hit_layer[e] >= 0:
+    if e >= wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]) or hit_layer[e] >= 0:
         return
     i = hit_vert[e]
     weight = float(0.0)
@@ -141,7 +141,8 @@ def propagate(
     r = wp.vec3(0.0, 0.0, 0.0)
     for k in range(vn_start[i], vn_start[i + 1]):
         j = vn_vert[k]
-        for f in range(hit_start[j], wp.min(hit_start[j + 1], count)):
+        around = hit_range(j, pair_start, hit_at, hit_vert.shape[0])
+        for f in range(around[0], around[1]):
             if hit_body[f] == hit_body[e] and hit_layer[f] >= 0 and hit_layer[f] < layer[0]:
                 gap = x[j] - x[i]
                 w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-20)
@@ -199,7 +200,7 @@ def vertex_contacts(
     plane_h: wp.array[float],  # (n_plane,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    hit_start: wp.array[int],  # (n_vert + 1,)
+    hit_at: wp.array[int],  # (n_pair + 1,)
     hit_vert: wp.array[int],  # (capacity,)
     hit_body: wp.array[int],  # (capacity,)
     hit_layer: wp.array[int],  # (capacity,)
@@ -215,7 +216,7 @@ def vertex_contacts(
 ):
     """One thread per hit: contact c = hit e of a surface vertex with a triangle or a plane."""
     e = wp.tid()
-    if e >= wp.min(hit_start[hit_start.shape[0] - 1], hit_vert.shape[0]):
+    if e >= wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]):
         return
     i = hit_vert[e]
     body = hit_body[e]

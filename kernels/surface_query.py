@@ -23,7 +23,6 @@ from warp_contact.kernels.geometry import (
 
 wp.set_module_options({"enable_backward": False})
 
-GRAZING = wp.constant(5.0e-3)  # sine below which a tet edge lies in a wall and does not cross it
 OBLIQUE = wp.constant(0.1)  # cosine: a ray along a wall in which it starts does not leave by it
 CREASE = wp.constant(0.6)  # cosine: edges sharper than 53 degrees keep their face normals
 
@@ -53,6 +52,7 @@ def first_hit(
     u: wp.vec3,
     after: float,  # only hits with t > after
     side: float,  # -1: entering (against the normal), +1: leaving
+    grazing: float,  # sine to a triangle's plane up to which it is not crossed
 ) -> Hit:
     """First crossing of p + t u, after < t <= 1, with the body's surface on the given side."""
     best = Hit()
@@ -67,7 +67,7 @@ def first_hit(
         b = x[tris[k][1]]
         c = x[tris[k][2]]
         if side * wp.dot(u, wp.cross(b - a, c - a)) > 0.0:
-            h = segment_hit(p, u, a, b, c, GRAZING)
+            h = segment_hit(p, u, a, b, c, grazing)
             if h[0] > after and h[0] <= 1.0:
                 if h[0] < best.t or (h[0] == best.t and k < best.tri):
                     best.tri = k
@@ -80,7 +80,45 @@ def first_hit(
 class Crossing:
     enter: Hit
     leave: Hit
-    close: bool  # whether any triangle's box was met
+
+
+@wp.func
+def no_crossing() -> Crossing:
+    out = Crossing()
+    out.enter.tri = -1
+    out.enter.t = NONE
+    out.leave.tri = -1
+    out.leave.t = NONE
+    return out
+
+
+@wp.func
+def with_tri(
+    found: Crossing, t: int, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3], p: wp.vec3, u: wp.vec3
+) -> Crossing:
+    """The first crossings when triangle t is looked at too."""
+    out = found
+    a = x[tris[t][0]]
+    b = x[tris[t][1]]
+    c = x[tris[t][2]]
+    h = segment_hit(p, u, a, b, c, PARALLEL)
+    if h[0] > 0.0 and h[0] <= 1.0:
+        if wp.dot(u, wp.cross(b - a, c - a)) < 0.0:
+            if h[0] < out.enter.t or (h[0] == out.enter.t and t < out.enter.tri):
+                out.enter.tri = t
+                out.enter.t = h[0]
+                out.enter.w = weights3(h)
+        elif h[0] < out.leave.t or (h[0] == out.leave.t and t < out.leave.tri):
+            out.leave.tri = t
+            out.leave.t = h[0]
+            out.leave.w = weights3(h)
+    return out
+
+
+@wp.func
+def starts_inside(found: Crossing) -> bool:
+    """Whether the segment leaves before it enters: the first leaving crossing is not the one."""
+    return found.enter.tri >= 0 and found.leave.tri >= 0 and found.leave.t < found.enter.t
 
 
 @wp.func
@@ -93,59 +131,16 @@ def first_crossing(
     u: wp.vec3,
 ) -> Crossing:
     """First entering crossing of p + t u, 0 < t <= 1, and the first leaving one after it."""
-    out = Crossing()
-    out.enter.tri = -1
-    out.enter.t = NONE
-    out.leave.tri = -1
-    out.leave.t = NONE
+    out = no_crossing()
     k = int(0)
     q = p + u
     root = wp.bvh_get_group_root(surface, body)
     query = wp.bvh_query_aabb(surface, wp.min(p, q), wp.max(p, q), root)
     while wp.bvh_query_next(query, k):
-        out.close = True
-        a = x[tris[k][0]]
-        b = x[tris[k][1]]
-        c = x[tris[k][2]]
-        h = segment_hit(p, u, a, b, c, PARALLEL)
-        if h[0] > 0.0 and h[0] <= 1.0:
-            if wp.dot(u, wp.cross(b - a, c - a)) < 0.0:
-                if h[0] < out.enter.t or (h[0] == out.enter.t and k < out.enter.tri):
-                    out.enter.tri = k
-                    out.enter.t = h[0]
-                    out.enter.w = weights3(h)
-            elif h[0] < out.leave.t or (h[0] == out.leave.t and k < out.leave.tri):
-                out.leave.tri = k
-                out.leave.t = h[0]
-                out.leave.w = weights3(h)
-    if out.enter.tri >= 0 and out.leave.tri >= 0 and out.leave.t < out.enter.t:
-        out.leave = first_hit(surface, body, tris, x, p, u, out.enter.t, 1.0)
+        out = with_tri(out, k, tris, x, p, u)
+    if starts_inside(out):
+        out.leave = first_hit(surface, body, tris, x, p, u, out.enter.t, 1.0, PARALLEL)
     return out
-
-
-@wp.func
-def holds(
-    surface: wp.uint64,
-    body: int,
-    tris: wp.array[wp.vec3i],
-    x: wp.array[wp.vec3],
-    p: wp.vec3,
-) -> bool:
-    """Whether p is inside the body: the first triangle above it faces up."""
-    inside = bool(False)
-    nearest = float(NONE)
-    k = int(0)
-    up = wp.vec3(0.0, 0.0, 1.0)
-    query = wp.bvh_query_ray(surface, p, up, wp.bvh_get_group_root(surface, body))
-    while wp.bvh_query_next(query, k, nearest):
-        a = x[tris[k][0]]
-        b = x[tris[k][1]]
-        c = x[tris[k][2]]
-        h = segment_hit(p, up, a, b, c, PARALLEL)
-        if h[0] >= 0.0 and h[0] < nearest:
-            nearest = h[0]
-            inside = wp.dot(up, wp.cross(b - a, c - a)) > 0.0
-    return inside
 
 
 @wp.func
@@ -178,6 +173,22 @@ def leaving_hit(
 
 
 @wp.func
+def closer(best: Hit, t: int, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3], p: wp.vec3) -> Hit:
+    """The closest point to p when triangle t is looked at too."""
+    out = best
+    a = x[tris[t][0]]
+    b = x[tris[t][1]]
+    c = x[tris[t][2]]
+    w = triangle_closest(p, a, b, c)
+    d = wp.length(w[0] * (a - p) + w[1] * (b - p) + w[2] * (c - p))
+    if d < out.t or (d == out.t and t < out.tri):
+        out.tri = t
+        out.t = d
+        out.w = w
+    return out
+
+
+@wp.func
 def closest_hit(
     surface: wp.uint64,
     body: int,
@@ -197,15 +208,7 @@ def closest_hit(
         grow = wp.vec3(radius, radius, radius)
         query = wp.bvh_query_aabb(surface, p - grow, p + grow, root)
         while wp.bvh_query_next(query, k):
-            a = x[tris[k][0]]
-            b = x[tris[k][1]]
-            c = x[tris[k][2]]
-            w = triangle_closest(p, a, b, c)
-            d = wp.length(w[0] * (a - p) + w[1] * (b - p) + w[2] * (c - p))
-            if d < best.t or (d == best.t and k < best.tri):
-                best.tri = k
-                best.t = d
-                best.w = w
+            best = closer(best, k, tris, x, p)
         if best.t <= radius:
             return best
         radius = 2.0 * radius

@@ -129,13 +129,17 @@ def dense():
     return matrix
 
 
+ROOM = {"contacts": 4096, "pairs": 64}
+ROOM |= {"verts": 8192, "tets": 65536, "edges": 8192, "tris": 65536, "near": 65536}
+
+
 def _stages(scene, capacity=None, dt=1e-3) -> tuple:
     from warp_contact.assemble import assemble
     from warp_contact.types import Capacity
     from warp_contact.work import allocate_work
 
     model, state = assemble(scene)
-    work = allocate_work(model, state, capacity or Capacity(contacts=2048, slots=4))
+    work = allocate_work(model, state, capacity or Capacity(**ROOM))
     work.dt.fill_(dt)
     return model, state, work
 
@@ -147,10 +151,10 @@ def stages():
 
 
 def _find_contacts(model, work, x0, x=None, edges=False) -> SimpleNamespace:
-    from warp_contact import detect, solver
+    from warp_contact import candidates, solver
 
     x = x0 if x is None else x
-    detect.near_bodies(model, x0, x, work)
+    candidates.refresh(model, x0, x, work)
     solver.vertex_contacts(model, x0, x, work, fresh=False)
     if edges:
         solver.edge_contacts(model, x0, x, work, fresh=False)

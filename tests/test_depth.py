@@ -12,7 +12,7 @@ RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 
 
 def hits(model, work) -> dict[tuple[int, int], tuple[int, float, np.ndarray]]:
-    n = int(work.hit_start.numpy()[model.n_vert])
+    n = int(work.n_hit.numpy()[0])
     arrays = work.hit_vert, work.hit_body, work.hit_layer, work.hit_depth, work.hit_dir
     rows = zip(*(a.numpy()[:n] for a in arrays), strict=True)
     return {(int(i), int(b)): (int(layer), float(d), r) for i, b, layer, d, r in rows}

@@ -48,6 +48,7 @@ def assemble(scene: Scene) -> tuple[Model, State]:
     ends = np.concatenate([links, links[:, ::-1]])
     ends = ends[np.lexsort((ends[:, 1], ends[:, 0]))]
 
+    of_tet = np.repeat(np.arange(len(bodies)), np.diff(tet0))
     model = Model(
         labels=tuple(body.label for body in bodies),
         materials=tuple(body.material for body in bodies),
@@ -74,6 +75,7 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         surf=_ints(surf),
         on_surface=_ints(on_surface),
         tets=wp.array(tets, dtype=wp.vec4i),
+        tet_body=_ints(np.concatenate([of_tet, len(bodies) + np.arange(len(scene.planes))])),
         pose=wp.array(pose, dtype=wp.mat33),
         volume=_floats(volume),
         tris=wp.array(tris, dtype=wp.vec3i),

@@ -11,12 +11,12 @@ def hit_depths(model: Model, x: wp.array, work: Work) -> None:
     """Set ``hit_depth``, ``hit_dir`` and ``hit_layer``: the border, then layer by layer."""
     work.layer.zero_()
     work.pending.zero_()
-    hits = [work.hit_start, work.hit_vert, work.hit_body]
+    hits = [work.candidates.verts.start, work.hit_at, work.hit_vert, work.hit_body]
     wp.launch(
         penetration.border_depth,
         dim=work.capacity.contacts,
-        inputs=[model.n_body, work.capacity.slots, work.surface.id, model.tris]
-        + [model.vs_start, model.vs_tri, model.vn_start, model.vn_vert, work.inside, x, *hits],
+        inputs=[model.n_body, work.surface.id, model.tris]
+        + [model.vs_start, model.vs_tri, model.vn_start, model.vn_vert, x, *hits],
         outputs=[work.hit_depth, work.hit_dir, work.hit_layer, work.pending],
     )
 
@@ -42,14 +42,8 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
         dim=work.capacity.contacts,
         inputs=[model.n_body, fresh, work.surface.id, model.tris, model.body_edge]
         + [model.vert_body, model.on_surface, model.plane_n, model.plane_h, x0, x]
-        + [
-            work.hit_start,
-            work.hit_vert,
-            work.hit_body,
-            work.hit_layer,
-            work.hit_depth,
-            work.hit_dir,
-        ],
+        + [work.hit_at, work.hit_vert, work.hit_body]
+        + [work.hit_layer, work.hit_depth, work.hit_dir],
         outputs=_records(work),
     )
     _count(work, work.none)
@@ -57,11 +51,21 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
 
 def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Append the contact records of the crossings at ``x`` in a step from ``x0``."""
+    c = work.candidates.edges
     wp.launch(
         crossing.edge_contacts,
-        dim=model.n_edge,
-        inputs=[fresh, work.surface.id, model.tris, model.edges, model.vert_body, model.body_edge]
-        + [work.hit_start, work.edge_start, work.edge_body, x0, x],
+        dim=work.capacity.edges,
+        inputs=[
+            fresh,
+            work.candidates.skin,
+            c.pair,
+            c.items,
+            c.item,
+            work.surface.id,
+            model.tris,
+            model.edges,
+        ]
+        + [model.vert_body, model.body_edge, work.n_hit, work.crossing_at, x0, x],
         outputs=_records(work),
     )
     _count(work, work.n_crossing)

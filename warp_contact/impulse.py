@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_contact.kernels import impulse, pairs, penalty
+from warp_contact.kernels import impulse, pair_impulses, penalty
 from warp_contact.response import Penalty
 from warp_contact.types import Model
 from warp_contact.work import Work
@@ -35,7 +35,7 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
             inputs=[model.friction, TOLERANCE, SWEEPS, work.dt, model.body_edge, c.pair, work.done]
             + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.open, c.turn]
             + [v, last],
-            outputs=[c.lam, c.slip, c.ahead, c.change, work.again],
+            outputs=[c.lam, c.slip, c.ahead, c.part, work.again],
         )
         _apply(model, v, work)
 
@@ -57,8 +57,8 @@ def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:
         penalty.penalty_impulses,
         dim=work.capacity.contacts,
         inputs=[response.stiffness, response.damping, model.friction, work.dt]
-        + [c.n, c.vert, c.coef, c.normal, c.depth, c.weight, v],
-        outputs=[c.lam, c.slip, c.change],
+        + [c.n, c.vert, c.coef, c.normal, c.depth, c.weight, c.open, c.turn, v],
+        outputs=[c.lam, c.slip, c.part],
     )
     _apply(model, v, work)
 
@@ -67,10 +67,10 @@ def record(model: Model, work: Work, unit: float) -> None:
     """Add the impulses of the step to their pairs of bodies, in counts of ``unit`` [N s]."""
     c = work.contacts
     wp.launch(
-        pairs.add_pair_impulses,
+        pair_impulses.add_pair_impulses,
         dim=work.capacity.contacts,
         inputs=[unit, c.n, c.pair, c.normal, c.lam, c.slip],
-        outputs=[work.pair_key, work.pair_total, c.needed[4:5]],
+        outputs=[work.pair_key, work.pair_total, c.needed[1:2]],
     )
 
 
@@ -79,6 +79,6 @@ def _apply(model: Model, v: wp.array, work: Work) -> None:
     wp.launch(
         impulse.apply_impulses,
         dim=model.n_vert,
-        inputs=[c.start, c.entry, c.coef, c.normal, c.open, c.turn, c.change] + [model.inv_mass],
+        inputs=[c.start, c.entry, c.part, model.inv_mass],
         outputs=[v, work.impulse],
     )

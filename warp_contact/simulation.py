@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import astuple
 
 import numpy as np
 import warp as wp
@@ -123,10 +123,10 @@ class Simulation:
         that came, is repeated from its start: nothing is lost.
         """
         with wp.ScopedDevice(self.device):
-            if self._search is None:
-                self._search = solver.overlaps(self.model, self.state, self._work)
             wp.copy(self._saved.x, self.state.x)
             wp.copy(self._saved.v, self.state.v)
+            while self._search is None or self._grow():
+                self._search = solver.overlaps(self.model, self.state, self._work)
             omega, rate = self._rates or self._spectra()
             for _attempt in range(ATTEMPTS):
                 dt = self._run(omega, rate)
@@ -252,19 +252,12 @@ class Simulation:
 
     def _grow(self) -> bool:
         """Enlarge the buffers that the frame outgrew; True if there were any."""
-        contacts, slots, edge_slots, near, pairs = self._work.contacts.needed.numpy().tolist()
-        if not (contacts or slots or edge_slots or near or pairs):
+        needed = self._work.contacts.needed.numpy()
+        if not needed.any():
             return False
-        old = self._work.capacity
-        capacity = replace(
-            old,
-            contacts=max(old.contacts, 2 * contacts),
-            slots=max(old.slots, 2 * old.slots if slots else 0),
-            edge_slots=max(old.edge_slots, edge_slots),
-            near=max(old.near, 2 * near),
-            pairs=max(old.pairs, 2 * pairs),
-        )
-        self._work = allocate_work(self.model, self._saved, capacity)
+        old = astuple(self._work.capacity)
+        capacity = [max(have, 2 * int(n)) for have, n in zip(old, needed, strict=True)]
+        self._work = allocate_work(self.model, self._saved, Capacity(*capacity))
         self._graphs.clear()
         return True
 

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_contact import depth, detect, impulse, surface
+from warp_contact import candidates, depth, detect, impulse, surface
 from warp_contact.forces import damp, internal_forces
 from warp_contact.kernels import motion
 from warp_contact.response import ContactSurface, Penalty
@@ -28,7 +28,7 @@ def step(
     the resolution of the recorded contact impulses.
     """
     if isinstance(response, Penalty):
-        detect.near_bodies(model, state.x, state.x, work)
+        candidates.refresh(model, state.x, state.x, work)
         vertex_contacts(
             model, state.x, state.x, work, False
         )  # forces belong to the positions they act at
@@ -39,7 +39,7 @@ def step(
         drift(model, state, work, state.x)
     elif response.search == "literal":
         predict(model, state, work, stages)
-        detect.near_bodies(model, state.x, work.x, work)
+        candidates.refresh(model, state.x, work.x, work)
         wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
         vertex_contacts(model, state.x, state.x, work, False)
         move_surfaces(model, state, work, response, search)
@@ -47,7 +47,7 @@ def step(
         impulse.record(model, work, unit)
     else:
         predict(model, state, work, stages)
-        detect.near_bodies(model, state.x, work.x, work)
+        candidates.refresh(model, state.x, work.x, work)
         vertex_contacts(model, state.x, work.x, work, not search)
         impulse.exchange(model, state.v, work)
         drift(model, state, work, work.x)
@@ -55,18 +55,21 @@ def step(
         wp.capture_if(work.n_crossing, lambda: impulse.exchange(model, state.v, work))
         impulse.record(model, work, unit)
         drift(model, state, work, state.x)
-        edge_contacts(model, state.x, state.x, work, not search, again=True)
+        edge_contacts(model, state.x, state.x, work, not search)
         move_surfaces(model, state, work, response, search)  # what the step did not create
 
 
 def overlaps(model: Model, state: State, work: Work) -> bool:
-    """Whether bodies overlap by more than a search is worth; reads back, so not for a step."""
+    """Whether bodies overlap by more than a search is worth; reads back, so not for a step.
+
+    What did not fit was not looked at: see ``contacts.needed``.
+    """
     work.dt.fill_(1.0)
-    detect.near_bodies(model, state.x, state.x, work)
+    work.contacts.needed.zero_()
+    candidates.refresh(model, state.x, state.x, work)
     vertex_contacts(model, state.x, state.x, work, False)
     surface.leftover(model, state.x, work)
-    # What did not fit was not looked at.
-    return bool(work.found.numpy()[1]) or bool(work.contacts.needed.numpy().any())
+    return bool(work.found.numpy()[1])
 
 
 def kick(model: Model, state: State, work: Work) -> None:
@@ -96,22 +99,16 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
 
 def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Stages 1 and 2: contacts of vertices inside other bodies at the positions ``x``."""
-    detect.find_inside(model, x, work)
-    detect.list_hits(model, x, work)
+    detect.find_hits(model, x, work)
     depth.hit_depths(model, x, work)
     depth.vertex_contacts(model, x0, x, work, fresh)
     depth.contacts_by_vertex(model, work)
     impulse.begin(model, x0, work, work.none)
 
 
-def edge_contacts(
-    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, again: bool = False
-) -> None:
-    """Stages 1 and 2: contacts of edges across other bodies at ``x``.
-
-    ``again``: the second time in a step, for which edges far from everything are known.
-    """
-    detect.find_crossings(model, x0, x, work, fresh, again)
+def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
+    """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
+    detect.find_crossings(model, x0, x, work, fresh)
 
     def append() -> None:
         depth.edge_contacts(model, x0, x, work, fresh)
@@ -140,7 +137,7 @@ def move_surfaces(
         surface.close(model, state.x, state.v, work, search)
         # Moved vertices leave edges across each other that stage 2 could not see.
         for _ in range(LOOKS):
-            edge_contacts(model, state.x, state.x, work, not search, again=True)
+            edge_contacts(model, state.x, state.x, work, not search)
             wp.capture_if(work.n_crossing, close_edges)
 
     def close_edges() -> None:

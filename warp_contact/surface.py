@@ -6,9 +6,9 @@ import warp as wp
 
 from warp_contact.forces import internal_forces
 from warp_contact.impulse import next_sweep
-from warp_contact.kernels import closure, region, surface
+from warp_contact.kernels import closure, incidence, region, surface
 from warp_contact.response import ContactSurface
-from warp_contact.types import Model
+from warp_contact.types import Contacts, Model
 from warp_contact.work import Work
 
 TOLERANCE = 1e-4  # of an edge: less overlap is left to the resting gap of the impulses
@@ -129,14 +129,9 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work, search: bool) -> N
             dim=work.capacity.contacts,
             inputs=[TOLERANCE, model.n_body, PASSES, c.n, c.vert, c.coef, c.normal, c.offset]
             + [c.pair, c.weight, model.body_edge, c.slack, x, work.done],
-            outputs=[c.push, c.change, work.again],
+            outputs=[c.push, c.part, work.again],
         )
-        wp.launch(
-            closure.close_gaps,
-            dim=model.n_vert,
-            inputs=[c.start, c.entry, c.coef, c.change, model.inv_mass],
-            outputs=[x],
-        )
+        _add_parts(model, c, x)
 
     work.done.zero_()
     wp.copy(work.again, c.n)
@@ -144,14 +139,18 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work, search: bool) -> N
     wp.launch(
         closure.couples,
         dim=work.capacity.contacts,
-        inputs=[c.n, c.vert, c.coef, c.push, v],
-        outputs=[c.change],
+        inputs=[c.n, c.vert, c.coef, c.normal, c.turn, c.push, v],
+        outputs=[c.part],
     )
+    _add_parts(model, c, v)
+
+
+def _add_parts(model: Model, c: Contacts, y: wp.array) -> None:
     wp.launch(
-        closure.hand_back,
+        incidence.add_parts,
         dim=model.n_vert,
-        inputs=[c.start, c.entry, c.normal, c.turn, c.change, model.inv_mass],
-        outputs=[v],
+        inputs=[c.start, c.entry, c.part, model.inv_mass],
+        outputs=[y],
     )
 
 

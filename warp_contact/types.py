@@ -56,6 +56,7 @@ class Model:
         surf: ids of the surface vertices, ascending, shape (n_surf,)
         on_surface: 1 for a surface vertex, shape (n_vert,)
         tets: positively oriented, shape (n_tet,)
+        tet_body: body of each tet, and of each plane behind them, shape (n_tet + n_plane,)
         pose: inverse of the rest edge matrix of each tet [1/m], shape (n_tet,)
         volume: rest volume of each tet [m^3], shape (n_tet,)
         tris: surface triangles, outward, shape (n_tri,)
@@ -96,6 +97,7 @@ class Model:
     surf: wp.array
     on_surface: wp.array
     tets: wp.array
+    tet_body: wp.array
     pose: wp.array
     volume: wp.array
     tris: wp.array
@@ -125,18 +127,69 @@ class State:
 
 
 @dataclass
+class Pairs:
+    """Vertices (or edges) and the bodies whose tets (or triangles) they may come to meet.
+
+    Attributes:
+        n: number of pairs, shape (1,)
+        pair: owner and body, in this order, shape (capacity,)
+        start: first pair of each owner, shape (n_owner + 1,)
+        items: first and end of each pair in ``item``, shape (capacity,)
+        item: tets or triangles, ascending for each owner, shape (capacity of items,)
+        item_start: first item of each owner, shape (n_owner + 1,)
+    """
+
+    n: wp.array
+    pair: wp.array
+    start: wp.array
+    items: wp.array
+    item: wp.array
+    item_start: wp.array
+
+
+@dataclass
+class Candidates:
+    """What may touch as long as no vertex is further than the skin from where it was then.
+
+    Attributes:
+        x: positions of the candidates [m], shape (n_vert,)
+        skin: how far from them they hold [m], shape (1,)
+        motion: largest motion in a step [m], shape (1,)
+        stale: whether they have to be found again, shape (1,)
+        edge: shortest mean edge of a body [m]
+        verts: vertices and bodies with tets; a plane is a body with one tet
+        edges: surface edges and bodies with triangles
+        n_found: length of the list that is being filled, shape (1,)
+        vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
+        near_tri: triangles in the slabs of near bodies, shape (capacity.near,)
+    """
+
+    x: wp.array
+    skin: wp.array
+    motion: wp.array
+    stale: wp.array
+    edge: float
+    verts: Pairs
+    edges: Pairs
+    n_found: wp.array
+    vert_tet: wp.array
+    edge_tri: wp.array
+    near_tri: wp.array
+
+
+@dataclass
 class Contacts:
     """What stage 1 and 2 find, rebuilt in every step. Vertex c's side moves along the normal.
 
     A contact joins a vertex, or a point of an edge, to a point of a triangle, or of its edge, by
     five vertices with signed weights: gap = (sum coef x) . normal - offset. The first
-    ``hit_start[n_vert]`` contacts are those of vertices. All capacities are fixed; what does not
+    ``n_hit`` contacts are those of vertices. All capacities are fixed; what does not
     fit is counted in ``needed`` and never written.
 
     Attributes:
         n: number of contacts, shape (1,)
-        needed: capacities that would have been enough, 0 where they were: contacts, slots of a
-            vertex, slots of an edge, near bodies, pairs; shape (5,)
+        needed: capacities that would have been enough, 0 where they were, in the order of
+            ``Capacity``; shape (7,)
         vert: vertices, shape (capacity, 5)
         coef: signed weights, shape (capacity, 5)
         normal: unit direction, shape (capacity,)
@@ -153,7 +206,7 @@ class Contacts:
         lam: normal impulse of the step [N s], shape (capacity,)
         slip: friction impulse of the step [N s], shape (capacity,)
         ahead: extrapolated friction and normal impulse [N s], shape (capacity,)
-        change: impulse of the last sweep [N s], shape (capacity,)
+        part: what the last sweep adds at each vertex [N s], shape (5 capacity,)
         left: overlap after the impulses [m], shape (capacity,)
         slack: part of it that later steps resolve [m], shape (capacity,)
         push: of the closure [kg m], shape (capacity,)
@@ -176,7 +229,7 @@ class Contacts:
     lam: wp.array
     slip: wp.array
     ahead: wp.array
-    change: wp.array
+    part: wp.array
     left: wp.array
     slack: wp.array
     push: wp.array
@@ -188,14 +241,18 @@ class Capacity:
 
     Attributes:
         contacts: contacts, and vertices inside other bodies
-        slots: bodies that one vertex is inside of
-        edge_slots: bodies that one edge crosses
-        near: bodies whose boxes meet that of one body
         pairs: pairs of bodies with a contact force
+        verts: pairs of a vertex and a body that may come to hold it
+        tets: the tets in question
+        edges: pairs of an edge and a body that it may come to cross
+        tris: the triangles in question
+        near: triangles of near bodies that reach into the slab of a body
     """
 
     contacts: int = 256
-    slots: int = 2
-    edge_slots: int = 2
-    near: int = 8
     pairs: int = 64
+    verts: int = 256
+    tets: int = 1024
+    edges: int = 256
+    tris: int = 1024
+    near: int = 1024

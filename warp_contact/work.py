@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import warp as wp
 
 from warp_contact.kernels import bounds
-from warp_contact.types import Capacity, Contacts, Model, State
+from warp_contact.kernels.near import MANY, Near
+from warp_contact.types import Candidates, Capacity, Contacts, Model, Pairs, State
 
 
 @dataclass
@@ -24,22 +25,19 @@ class Work:
         tri_lower, tri_upper: boxes of the triangles [m], shape (n_tri,)
         bodies: Bvh over the bodies, grouped by world
         surface: Bvh over the triangles, grouped by body
-        n_near: number of near bodies, shape (n_body,)
-        near: their ids, shape (n_body, capacity.near)
+        near: the bodies that may touch a body, ``kernels.near.Near``
         key: hash of each vertex' cell, -1 for none, shape (n_vert,)
         cell_start: first vertex of each cell, shape (n_cell + 1,)
         cell_vert: vertices by cell, shape (n_vert,)
-        inside: bodies that each vertex is inside of, shape (n_vert * capacity.slots,)
-        hit_start: first hit of each vertex, shape (n_vert + 1,)
+        candidates: what may touch
+        hit_at: hits before each candidate vertex, shape (capacity.verts + 1,)
         hit_vert, hit_body, hit_layer, hit_depth, hit_dir: the hits, shape (capacity.contacts,)
-        edge_start: first crossing of each surface edge, shape (n_edge + 1,)
-        edge_close: edges that were close to another body's triangle, shape (n_edge,)
-        edge_body: bodies that each edge crosses, shape (n_edge, capacity.edge_slots)
+        crossing_at: contacts before each candidate edge, shape (capacity.edges + 1,)
         layer: layer of the propagation, shape (1,)
         pending: whether it goes on, shape (1,)
         contacts: the contact records
         none: zero, shape (1,)
-        n_hit, n_crossing: views of the last entries of ``hit_start`` and ``edge_start``
+        n_hit, n_crossing: views of the last entries of ``hit_at`` and ``crossing_at``
         done: sweeps over the contacts so far, shape (1,)
         again: whether another is needed, shape (1,)
         found: whether stage 4 has anything to close and to search, shape (2,)
@@ -68,21 +66,18 @@ class Work:
     tri_upper: wp.array
     bodies: wp.Bvh
     surface: wp.Bvh
-    n_near: wp.array
-    near: wp.array
+    near: Near
     key: wp.array
     cell_start: wp.array
     cell_vert: wp.array
-    inside: wp.array
-    hit_start: wp.array
+    candidates: Candidates
+    hit_at: wp.array
     hit_vert: wp.array
     hit_body: wp.array
     hit_layer: wp.array
     hit_depth: wp.array
     hit_dir: wp.array
-    edge_start: wp.array
-    edge_close: wp.array
-    edge_body: wp.array
+    crossing_at: wp.array
     layer: wp.array
     pending: wp.array
     contacts: Contacts
@@ -112,9 +107,12 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
     lower, upper = _vectors(model.n_body), _vectors(model.n_body)
     tri_lower, tri_upper = _vectors(model.n_tri), _vectors(model.n_tri)
     n_near = wp.full(model.n_body, 1, dtype=int)
-    hit_start, edge_start = _ints(n + 1), _ints(model.n_edge + 1)
-    launch_body_boxes(model, state.x, state.x, lower, upper)
-    launch_triangle_boxes(model, state.x, state.x, n_near, tri_lower, tri_upper)
+    candidates = _allocate_candidates(model, capacity)
+    hit_at, crossing_at = _ints(capacity.verts + 1), _ints(capacity.edges + 1)
+    launch_body_boxes(model, state.x, candidates.skin, lower, upper)
+    launch_triangle_boxes(model, state.x, candidates.skin, n_near, tri_lower, tri_upper)
+    bodies = wp.Bvh(lower, upper, groups=model.body_world)
+    near = _allocate_near(model, bodies, lower, upper, n_near)
     return Work(
         capacity=capacity,
         dt=wp.zeros(1, dtype=float),
@@ -127,29 +125,26 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
         upper=upper,
         tri_lower=tri_lower,
         tri_upper=tri_upper,
-        bodies=wp.Bvh(lower, upper, groups=model.body_world),
+        bodies=bodies,
         surface=wp.Bvh(tri_lower, tri_upper, groups=model.tri_body),
-        n_near=n_near,
-        near=wp.zeros((model.n_body, capacity.near), dtype=int),
+        near=near,
         key=_ints(n),
         cell_start=_ints(2 * n + 2),
         cell_vert=_ints(n),
-        inside=_ints(n * capacity.slots),
-        hit_start=hit_start,
+        candidates=candidates,
+        hit_at=hit_at,
         hit_vert=_ints(m),
         hit_body=_ints(m),
         hit_layer=_ints(m),
         hit_depth=_floats(m),
         hit_dir=_vectors(m),
-        edge_start=edge_start,
-        edge_close=_ints(model.n_edge),
-        edge_body=wp.zeros((model.n_edge, capacity.edge_slots), dtype=int),
+        crossing_at=crossing_at,
         layer=_ints(1),
         pending=_ints(1),
         contacts=_allocate_contacts(n, m),
         none=_ints(1),
-        n_hit=hit_start[n:],
-        n_crossing=edge_start[model.n_edge :],
+        n_hit=hit_at[capacity.verts :],
+        n_crossing=crossing_at[capacity.edges :],
         done=_ints(1),
         again=_ints(1),
         found=_ints(2),
@@ -169,39 +164,81 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
 
 
 def launch_body_boxes(
-    model: Model, x0: wp.array, x1: wp.array, lower: wp.array, upper: wp.array
+    model: Model, x: wp.array, skin: wp.array, lower: wp.array, upper: wp.array
 ) -> None:
-    """Set the boxes of the bodies around both positions."""
+    """Set the boxes of the bodies, grown by the skin [m], shape (1,)."""
     wp.launch(bounds.clear_boxes, dim=model.n_body, inputs=[], outputs=[lower, upper])
     wp.launch(
         bounds.body_boxes,
         dim=-(-model.n_surf // int(bounds.CHUNK)),
-        inputs=[model.surf, model.vert_body, x0, x1],
+        inputs=[model.surf, model.vert_body, skin, x],
         outputs=[lower, upper],
     )
 
 
 def launch_triangle_boxes(
     model: Model,
-    x0: wp.array,
-    x1: wp.array,
+    x: wp.array,
+    skin: wp.array,
     n_near: wp.array,
     lower: wp.array,
     upper: wp.array,
 ) -> None:
-    """Set the boxes of the triangles of bodies that are near another, around both positions."""
+    """Set the boxes of the triangles of bodies near another, grown by the skin [m], shape (1,)."""
     wp.launch(
         bounds.triangle_boxes,
         dim=model.n_tri,
-        inputs=[model.tris, model.tri_body, n_near, model.body_edge, x0, x1],
+        inputs=[model.tris, model.tri_body, n_near, model.body_edge, skin, x],
         outputs=[lower, upper],
+    )
+
+
+def _allocate_near(
+    model: Model, bodies: wp.Bvh, lower: wp.array, upper: wp.array, n_near: wp.array
+) -> Near:
+    shape = model.n_body, int(MANY)
+    near = Near()
+    near.bodies, near.world = bodies.id, model.body_world
+    near.lower, near.upper = lower, upper
+    near.n_near, near.near = n_near, wp.zeros(shape, dtype=int)
+    near.slab, near.end = wp.zeros(shape, dtype=wp.vec4), wp.zeros(shape, dtype=float)
+    near.vert_lower, near.vert_upper = (wp.zeros(shape, dtype=wp.vec3) for _ in range(2))
+    near.tri_lower, near.tri_upper = (wp.zeros(shape, dtype=wp.vec3) for _ in range(2))
+    near.tris = wp.zeros(shape, dtype=wp.vec2i)
+    return near
+
+
+def _allocate_candidates(model: Model, capacity: Capacity) -> Candidates:
+    return Candidates(
+        x=_vectors(model.n_vert),
+        skin=_floats(1),
+        motion=_floats(1),
+        stale=wp.full(1, 1, dtype=int),
+        edge=float(model.body_edge.numpy().min()),
+        verts=_allocate_pairs(model.n_vert, capacity.verts, capacity.tets),
+        edges=_allocate_pairs(model.n_edge, capacity.edges, capacity.tris),
+        n_found=_ints(1),
+        vert_tet=wp.zeros(capacity.tets, dtype=wp.vec2i),
+        edge_tri=wp.zeros(capacity.tris, dtype=wp.vec2i),
+        near_tri=_ints(capacity.near),
+    )
+
+
+def _allocate_pairs(n_owner: int, n_pair: int, n_item: int) -> Pairs:
+    return Pairs(
+        n=_ints(1),
+        pair=wp.zeros(n_pair, dtype=wp.vec2i),
+        start=_ints(n_owner + 1),
+        items=wp.zeros(n_pair, dtype=wp.vec2i),
+        item=_ints(n_item),
+        item_start=_ints(n_owner + 1),
     )
 
 
 def _allocate_contacts(n: int, m: int) -> Contacts:
     return Contacts(
         n=_ints(1),
-        needed=_ints(5),
+        needed=_ints(7),
         vert=wp.zeros((m, 5), dtype=int),
         coef=wp.zeros((m, 5), dtype=float),
         normal=_vectors(m),
@@ -217,7 +254,7 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         lam=_floats(m),
         slip=_vectors(m),
         ahead=wp.zeros(m, dtype=wp.vec4),
-        change=_vectors(m),
+        part=_vectors(5 * m),
         left=_floats(m),
         slack=_floats(m),
         push=_floats(m),

@@ -13,7 +13,7 @@ import numpy as np
 import warp_contact as wc
 from checks.heights import facing, height
 from checks.table import Row
-from warp_contact import detect, solver, surface
+from warp_contact import candidates, solver, surface
 from warp_contact.types import Capacity
 from warp_contact.work import Work, allocate_work
 
@@ -101,7 +101,7 @@ def settle(sim: wc.Simulation, work: Work) -> int:
     work.dt.fill_(DT)
     work.bodies.rebuild()
     for call in range(CALLS):
-        detect.near_bodies(model, state.x, state.x, work)
+        candidates.refresh(model, state.x, state.x, work)
         solver.vertex_contacts(model, state.x, state.x, work, fresh=False)
         if sim.response.search == "balanced":
             solver.edge_contacts(model, state.x, state.x, work, fresh=False)

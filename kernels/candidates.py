@@ -1,0 +1,160 @@
+"""What may touch while nothing moves further than a skin: found once, kept for many steps.
+
+Candidates are found at the positions of some step. As long as no vertex is further than the
+skin from there, all that touches is among them, and the steps test them exactly: the same contacts
+come out as without (Verlet 1967). They are found again once some vertex has moved by half the skin;
+the other half is for what impulses and the closure add to the prediction within a step.
+
+    skin = SPAN times the largest motion in a step, between LEAST and MOST of the shortest edge [m]
+
+An edge and a triangle are candidates unless an axis separates them by more than two skins. Threads
+append what they find to a list in any order; pairs.py sorts it.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.near import MANY, Near, next_near, part, reaches
+from warp_contact.kernels.pairs import append
+
+wp.set_module_options({"enable_backward": False})
+
+SPAN = wp.constant(6.0)  # half of it is the number of steps that candidates last
+LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
+MOST = wp.constant(0.1)  # of the shortest edge: longer lists cost more than they save
+FEWEST = wp.constant(3.0)  # largest motions in a step that the skin must hold all the same
+CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the maximum
+
+
+@wp.kernel
+def moved(
+    # in
+    skin: wp.array[float],  # (1,) [m]
+    built: wp.array[wp.vec3],  # (n_vert,) [m] positions of the candidates
+    x0: wp.array[wp.vec3],  # (n_vert,) [m]
+    x1: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out, added to
+    stale: wp.array[int],  # (1,) 1 when the candidates have to be found again
+):
+    """One thread per vertex: whether it has used up half of the skin."""
+    i = wp.tid()
+    d = wp.max(wp.length_sq(x0[i] - built[i]), wp.length_sq(x1[i] - built[i]))
+    if not d <= 0.25 * skin[0] * skin[0]:
+        stale[0] = 1
+
+
+@wp.kernel
+def fastest(
+    # in
+    x0: wp.array[wp.vec3],  # (n_vert,) [m]
+    x1: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out, added to
+    motion: wp.array[float],  # (1,) [m]
+):
+    """One thread per CHUNK of vertices: the largest motion in the step."""
+    first = wp.tid() * CHUNK
+    largest = float(0.0)
+    for k in range(first, wp.min(first + CHUNK, x0.shape[0])):
+        largest = wp.max(largest, wp.length(x1[k] - x0[k]))
+    wp.atomic_max(motion, 0, largest)
+
+
+@wp.kernel
+def set_skin(
+    # in
+    edge: float,  # shortest mean edge of a body [m]
+    # in, out
+    motion: wp.array[float],  # (1,) [m], 0 on return
+    stale: wp.array[int],  # (1,) 0 on return
+    # out
+    skin: wp.array[float],  # (1,) [m]
+):
+    """One thread."""
+    m = motion[0]
+    skin[0] = wp.max(wp.clamp(SPAN * m, LEAST * edge, MOST * edge), FEWEST * m)
+    motion[0] = 0.0
+    stale[0] = 0
+
+
+@wp.func
+def apart(
+    axis: wp.vec3, p: wp.vec3, q: wp.vec3, b: wp.vec3, c: wp.vec3, reach: float
+) -> bool:  # relative to corner a of the triangle
+    """Whether the axis separates pq from the triangle 0bc by more than the reach."""
+    sp = wp.dot(axis, p)
+    sq = wp.dot(axis, q)
+    sb = wp.dot(axis, b)
+    sc = wp.dot(axis, c)
+    lo = wp.min(wp.min(sb, sc), 0.0)
+    hi = wp.max(wp.max(sb, sc), 0.0)
+    return wp.max(wp.min(sp, sq) - hi, lo - wp.max(sp, sq)) > reach * wp.length(axis)
+
+
+@wp.func
+def may_cross(p: wp.vec3, q: wp.vec3, t: wp.vec3i, reach: float, x: wp.array[wp.vec3]) -> bool:
+    """Whether no axis of the separating axis theorem keeps pq and triangle t apart by the reach."""
+    a = x[t[0]]
+    d = q - p
+    ab = x[t[1]] - a
+    ac = x[t[2]] - a
+    n = wp.cross(ab, ac)
+    if apart(n, p - a, q - a, ab, ac, reach):
+        return False
+    if apart(wp.cross(n, d), p - a, q - a, ab, ac, reach):
+        return False
+    e = ab
+    for k in range(3):
+        if k == 1:
+            e = ac
+        if k == 2:
+            e = ac - ab
+        if apart(wp.cross(n, e), p - a, q - a, ab, ac, reach):
+            return False
+        if apart(wp.cross(d, e), p - a, q - a, ab, ac, reach):
+            return False
+    return True
+
+
+@wp.kernel
+def visit_edges(
+    # in
+    skin: wp.array[float],  # (1,) [m]
+    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    edges: wp.array[wp.vec4i],  # (n_edge,)
+    vert_body: wp.array[int],  # (n_vert,)
+    of: Near,
+    near_tri: wp.array[int],  # (capacity,) of near.py
+    lower: wp.array[wp.vec3],  # (n_tri,) boxes of the triangles [m]
+    upper: wp.array[wp.vec3],  # (n_tri,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    found: wp.array[wp.vec2i],  # (capacity,) edge and triangle
+    # out, added to
+    n_found: wp.array[int],  # (1,)
+):
+    """One thread per surface edge: the triangles that it may come to cross."""
+    e = wp.tid()
+    m = vert_body[edges[e][0]]
+    p = x[edges[e][0]]
+    q = x[edges[e][1]]
+    own = part(p, p, q, q, skin[0])
+    if of.n_near[m] <= MANY:
+        for k in range(of.n_near[m]):
+            if reaches(own, of.slab[m, k]):
+                if boxes_meet(own.lo, own.hi, of.tri_lower[m, k], of.tri_upper[m, k]):
+                    for c in range(of.tris[m, k][0], of.tris[m, k][1]):
+                        t = near_tri[c]
+                        if boxes_meet(own.lo, own.hi, lower[t], upper[t]):
+                            if may_cross(p, q, tris[t], 2.0 * skin[0], x):
+                                append(e, t, found, n_found)
+    else:
+        body = next_near(m, -1, own, of)
+        while body >= 0:
+            t = int(0)
+            root = wp.bvh_get_group_root(surface, body)
+            query = wp.bvh_query_aabb(surface, own.lo, own.hi, root)
+            while wp.bvh_query_next(query, t):
+                if may_cross(p, q, tris[t], 2.0 * skin[0], x):
+                    append(e, t, found, n_found)
+            body = next_near(m, body, own, of)

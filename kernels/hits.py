@@ -1,0 +1,88 @@
+"""Stage 1, in every step: which candidates are hits, a vertex inside a body or below a plane.
+
+Hits keep the order of their candidates: by vertex, then by body, planes last.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.geometry import tet_weights
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def find_hits(
+    # in
+    n_pair: wp.array[int],  # (1,)
+    pair: wp.array[wp.vec2i],  # (capacity,) vertex and body, n_body + p for plane p
+    pair_tets: wp.array[wp.vec2i],  # (capacity,) first and end in ``tet``
+    tet: wp.array[int],  # (capacity,)
+    n_body: int,
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    plane_n: wp.array[wp.vec3],  # (n_plane,)
+    plane_h: wp.array[float],  # (n_plane,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    hit: wp.array[int],  # (capacity + 1,) 1 for a hit
+):
+    """One thread per candidate, and one more for the end of the list."""
+    c = wp.tid()
+    hit[c] = 0
+    if c >= n_pair[0]:
+        return
+    p = x[pair[c][0]]
+    body = pair[c][1]
+    if body >= n_body:
+        if wp.dot(plane_n[body - n_body], p) < plane_h[body - n_body]:
+            hit[c] = 1
+        return
+    for k in range(pair_tets[c][0], pair_tets[c][1]):
+        t = tets[tet[k]]
+        if wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0:
+            hit[c] = 1
+            return
+
+
+@wp.kernel
+def list_hits(
+    # in
+    n_body: int,
+    pair: wp.array[wp.vec2i],  # (capacity,)
+    hit_at: wp.array[int],  # (capacity + 1,) hits before each candidate
+    # out
+    hit_vert: wp.array[int],  # (contacts,)
+    hit_body: wp.array[int],  # (contacts,) n_body + p for plane p
+    hit_layer: wp.array[int],  # (contacts,) -1: no depth yet
+):
+    """One thread per candidate."""
+    c = wp.tid()
+    e = hit_at[c]
+    if hit_at[c + 1] == e or e >= hit_vert.shape[0]:
+        return
+    hit_vert[e] = pair[c][0]
+    hit_body[e] = pair[c][1]
+    hit_layer[e] = -1
+    if pair[c][1] >= n_body:
+        hit_layer[e] = 0
+
+
+@wp.func
+def hit_range(i: int, pair_start: wp.array[int], hit_at: wp.array[int], room: int) -> wp.vec2i:
+    """First and end of the hits of vertex i; none where the candidates did not fit."""
+    last = hit_at.shape[0] - 1
+    return wp.vec2i(
+        wp.min(hit_at[wp.min(pair_start[i], last)], room),
+        wp.min(hit_at[wp.min(pair_start[i + 1], last)], room),
+    )
+
+
+@wp.func
+def is_hit(
+    i: int, body: int, pair_start: wp.array[int], hit_at: wp.array[int], hit_body: wp.array[int]
+) -> bool:
+    """Whether vertex i is inside the body."""
+    around = hit_range(i, pair_start, hit_at, hit_body.shape[0])
+    for e in range(around[0], around[1]):
+        if hit_body[e] == body:
+            return True
+    return False

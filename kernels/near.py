@@ -1,0 +1,244 @@
+"""The bodies that may touch a body, and the parts of theirs that may.
+
+Two bodies may touch unless their boxes, or the slabs that hold them along the line through the
+centres of their boxes, are apart. Of each near body the vertices and triangles that reach into the
+slab of the other one are boxed and listed: in a pile, a cap of it. A body that is near very many
+others, such as the floor of a pile, lists none of them: its parts ask the Bvh over the bodies.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.geometry import boxes_meet
+
+wp.set_module_options({"enable_backward": False})
+
+MANY = wp.constant(32)  # near bodies that are worth a list
+LARGE = wp.constant(512)  # vertices of a body that is taken by its box
+HUGE = wp.constant(1.0e5)  # cells along a body: more is not a body any longer
+
+
+@wp.func
+def box_support(axis: wp.vec3, lo: wp.vec3, hi: wp.vec3) -> float:
+    """Largest coordinate of a box along an axis [m]."""
+    return wp.dot(0.5 * (lo + hi), axis) + wp.dot(0.5 * (hi - lo), wp.abs(axis))
+
+
+@wp.func
+def support(
+    body: int,
+    axis: wp.vec3,
+    skin: float,
+    body_vert: wp.array[int],
+    lower: wp.array[wp.vec3],
+    upper: wp.array[wp.vec3],
+    x: wp.array[wp.vec3],
+) -> float:
+    """Largest coordinate of a body and its skin along a unit axis [m], or more."""
+    if body_vert[body + 1] - body_vert[body] > LARGE:
+        return box_support(axis, lower[body], upper[body])
+    s = float(-1.0e30)
+    for i in range(body_vert[body], body_vert[body + 1]):
+        s = wp.max(s, wp.dot(x[i], axis))
+    return s + skin
+
+
+@wp.kernel
+def near_bodies(
+    # in
+    cell: float,  # [m]
+    skin: wp.array[float],  # (1,) [m]
+    bodies: wp.uint64,  # Bvh over the boxes, grouped by world
+    world: wp.array[int],  # (n_body,)
+    body_vert: wp.array[int],  # (n_body + 1,)
+    lower: wp.array[wp.vec3],  # (n_body,) [m]
+    upper: wp.array[wp.vec3],  # (n_body,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    n_near: wp.array[int],  # (n_body,), MANY + 1 for a body without a list
+    near: wp.array2d[int],  # (n_body, MANY), ascending
+    slab: wp.array2d[wp.vec4],  # (n_body, MANY) axis towards the near body, where it begins [m]
+    end: wp.array2d[float],  # (n_body, MANY) where the own body ends along the axis [m]
+):
+    """One thread per body: list the bodies of its world that may touch it."""
+    m = wp.tid()
+    n_near[m] = 0
+    # What has exploded has no contacts, and no loop over its cells.
+    if not wp.length(upper[m] - lower[m]) < HUGE * cell:
+        return
+    count = int(0)
+    other = int(0)
+    query = wp.bvh_query_aabb(bodies, lower[m], upper[m], wp.bvh_get_group_root(bodies, world[m]))
+    while wp.bvh_query_next(query, other):
+        if count <= MANY and other != m:
+            if boxes_meet(lower[m], upper[m], lower[other], upper[other]):
+                axis = wp.normalize((lower[other] + upper[other]) - (lower[m] + upper[m]))
+                begin = -support(other, -axis, skin[0], body_vert, lower, upper, x)
+                last = support(m, axis, skin[0], body_vert, lower, upper, x)
+                if last >= begin:
+                    if count < MANY:
+                        k = int(count)
+                        while k > 0 and near[m, wp.max(k - 1, 0)] > other:
+                            near[m, k] = near[m, k - 1]
+                            slab[m, k] = slab[m, k - 1]
+                            end[m, k] = end[m, k - 1]
+                            k -= 1
+                        near[m, k] = other
+                        slab[m, k] = wp.vec4(axis[0], axis[1], axis[2], begin)
+                        end[m, k] = last
+                    count += 1
+    n_near[m] = count
+
+
+@wp.struct
+class Part:
+    """A part of a body: its corners, and the box around them and their skin."""
+
+    a: wp.vec3
+    b: wp.vec3
+    c: wp.vec3
+    d: wp.vec3
+    lo: wp.vec3
+    hi: wp.vec3
+    skin: float
+
+
+@wp.func
+def part(a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3, skin: float) -> Part:
+    out = Part()
+    out.a = a
+    out.b = b
+    out.c = c
+    out.d = d
+    out.lo = wp.min(wp.min(a, b), wp.min(c, d)) - wp.vec3(skin, skin, skin)
+    out.hi = wp.max(wp.max(a, b), wp.max(c, d)) + wp.vec3(skin, skin, skin)
+    out.skin = skin
+    return out
+
+
+@wp.func
+def reaches(p: Part, slab: wp.vec4) -> bool:
+    """Whether a corner is in the slab of a near body."""
+    n = wp.vec3(slab[0], slab[1], slab[2])
+    s = wp.max(wp.max(wp.dot(n, p.a), wp.dot(n, p.b)), wp.max(wp.dot(n, p.c), wp.dot(n, p.d)))
+    return s + p.skin >= slab[3]
+
+
+@wp.struct
+class Near:
+    """Where to look for the bodies near a body; lists have the shape (n_body, MANY)."""
+
+    bodies: wp.uint64  # Bvh over the boxes, grouped by world
+    world: wp.array(dtype=int)
+    lower: wp.array(dtype=wp.vec3)  # boxes of the bodies [m]
+    upper: wp.array(dtype=wp.vec3)
+    n_near: wp.array(dtype=int)
+    near: wp.array2d(dtype=int)
+    slab: wp.array2d(dtype=wp.vec4)  # axis, and where the near body begins along it [m]
+    end: wp.array2d(dtype=float)  # where the own body ends along it [m]
+    vert_lower: wp.array2d(dtype=wp.vec3)  # box of the near body's vertices up to there [m]
+    vert_upper: wp.array2d(dtype=wp.vec3)
+    tri_lower: wp.array2d(dtype=wp.vec3)  # box of its triangles up to there [m]
+    tri_upper: wp.array2d(dtype=wp.vec3)
+    tris: wp.array2d(dtype=wp.vec2i)  # first and end of these triangles in a list
+
+
+@wp.kernel
+def near_parts(
+    # in
+    skin: wp.array[float],  # (1,) [m]
+    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    body_vert: wp.array[int],  # (n_body + 1,)
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    of: Near,
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    vert_lower: wp.array2d[wp.vec3],  # (n_body, MANY) [m]
+    vert_upper: wp.array2d[wp.vec3],  # (n_body, MANY) [m]
+    tri_lower: wp.array2d[wp.vec3],  # (n_body, MANY) [m]
+    tri_upper: wp.array2d[wp.vec3],  # (n_body, MANY) [m]
+    range_of: wp.array2d[wp.vec2i],  # (n_body, MANY) first and end in ``near_tri``
+    near_tri: wp.array[int],  # (capacity,)
+    # out, added to
+    count: wp.array[int],  # (1,)
+):
+    """One thread per entry of the lists; triangles that do not fit are counted and left out."""
+    m, k = wp.tid()
+    if of.n_near[m] > MANY or k >= of.n_near[m]:
+        return
+    body = of.near[m, k]
+    s = of.slab[m, k]
+    back = wp.vec4(-s[0], -s[1], -s[2], -of.end[m, k])
+    grow = wp.vec3(skin[0], skin[0], skin[0])
+    lo = wp.vec3(1.0e30, 1.0e30, 1.0e30)
+    hi = -lo
+    if body_vert[body + 1] - body_vert[body] > LARGE:
+        lo = of.lower[body]
+        hi = of.upper[body]
+    else:
+        for i in range(body_vert[body], body_vert[body + 1]):
+            if reaches(part(x[i], x[i], x[i], x[i], skin[0]), back):
+                lo = wp.min(lo, x[i] - grow)
+                hi = wp.max(hi, x[i] + grow)
+    vert_lower[m, k] = lo
+    vert_upper[m, k] = hi
+    lo = wp.vec3(1.0e30, 1.0e30, 1.0e30)
+    hi = -lo
+    range_of[m, k] = wp.vec2i(0, 0)
+    root = wp.bvh_get_group_root(surface, body)
+    first = int(0)
+    for fill in range(2):
+        n = int(0)
+        t = int(0)
+        query = wp.bvh_query_aabb(surface, of.lower[m], of.upper[m], root)
+        while wp.bvh_query_next(query, t):
+            c = x[tris[t][2]]
+            p = part(x[tris[t][0]], x[tris[t][1]], c, c, skin[0])
+            if reaches(p, back):
+                if fill == 1:
+                    near_tri[first + n] = t
+                lo = wp.min(lo, p.lo)
+                hi = wp.max(hi, p.hi)
+                n += 1
+        if fill == 0:
+            tri_lower[m, k] = lo
+            tri_upper[m, k] = hi
+            first = wp.atomic_add(count, 0, n)
+            if first + n > near_tri.shape[0]:
+                return
+            range_of[m, k] = wp.vec2i(first, first + n)
+
+
+@wp.kernel
+def fits(
+    # in
+    capacity: int,
+    # in, out
+    count: wp.array[int],  # (1,) 0 on return
+    # out, added to
+    needed: wp.array[int],  # (1,) largest number that did not fit
+):
+    """One thread."""
+    if count[0] > capacity:
+        wp.atomic_max(needed, 0, count[0])
+    count[0] = 0
+
+
+@wp.func
+def next_near(m: int, last: int, p: Part, of: Near) -> int:
+    """The first body after ``last`` that a part of body m may touch, or -1."""
+    if of.n_near[m] <= MANY:
+        for k in range(of.n_near[m]):
+            body = of.near[m, k]
+            if body > last and reaches(p, of.slab[m, k]):
+                if boxes_meet(p.lo, p.hi, of.lower[body], of.upper[body]):
+                    return body
+        return -1
+    first = int(-1)
+    body = int(0)
+    root = wp.bvh_get_group_root(of.bodies, of.world[m])
+    query = wp.bvh_query_aabb(of.bodies, p.lo, p.hi, root)
+    while wp.bvh_query_next(query, body):
+        if body != m and body > last and (first < 0 or body < first):
+            if of.n_near[body] > 0 and boxes_meet(p.lo, p.hi, of.lower[body], of.upper[body]):
+                first = body
+    return first

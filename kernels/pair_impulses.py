@@ -1,0 +1,51 @@
+"""The contact force between two bodies: impulses summed over a frame, in any order.
+
+Threads race for the slots of a table and for its sums. Impulses are added as integers, whose sum
+has no order, so the result repeats bit for bit.
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def add_pair_impulses(
+    # in
+    unit: float,  # momentum of one count [N s]
+    n_contact: wp.array[int],  # (1,)
+    pair: wp.array[wp.vec2i],  # (capacity,)
+    normal: wp.array[wp.vec3],  # (capacity,)
+    lam: wp.array[float],  # (capacity,) [N s]
+    slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    # in, out
+    key: wp.array[wp.int64],  # (n_pair,) lower body * 2^32 + upper body, -1 where free
+    total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
+    needed: wp.array[int],  # (1,) pairs that would have been enough
+):
+    """One thread per contact: add to its pair, as integers, whose sum has no order."""
+    c = wp.tid()
+    if c >= n_contact[0] or lam[c] <= 0.0:
+        return
+    p = lam[c] * normal[c] + slip[c]
+    lo = pair[c][0]
+    hi = pair[c][1]
+    if lo > hi:
+        lo = pair[c][1]
+        hi = pair[c][0]
+        p = -p
+    name = (wp.int64(lo) << wp.int64(32)) | wp.int64(hi)
+    n = key.shape[0]
+    slot = int(
+        (wp.uint32(lo) * wp.uint32(73856093) ^ wp.uint32(hi) * wp.uint32(19349663)) % wp.uint32(n)
+    )
+    for _probe in range(n):
+        seen = wp.atomic_cas(key, slot, wp.int64(-1), name)
+        if seen == wp.int64(-1) or seen == name:
+            for k in range(3):
+                wp.atomic_add(
+                    total, slot, k, wp.int64(wp.round(wp.float64(p[k]) / wp.float64(unit)))
+                )
+            return
+        slot = (slot + 1) % n
+    wp.atomic_max(needed, 0, n + 1)

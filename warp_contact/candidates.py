@@ -1,0 +1,145 @@
+"""Stage 1, now and then: near bodies, and the vertices and edges that may come to touch them."""
+
+import warp as wp
+
+from warp_contact.kernels import candidates, hashing, near
+from warp_contact.kernels import pairs as kernels
+from warp_contact.types import Model, Pairs
+from warp_contact.work import Work, launch_body_boxes, launch_triangle_boxes
+
+
+def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
+    """Find the candidates at ``x0`` unless those at hand hold for a step from ``x0`` to ``x1``."""
+    c = work.candidates
+    wp.launch(candidates.moved, dim=model.n_vert, inputs=[c.skin, c.x, x0, x1], outputs=[c.stale])
+
+    def find() -> None:
+        wp.copy(c.x, x0)
+        _choose_skin(model, x1, work)
+        _find_near(model, work)
+        _find_tets(model, work)
+        _find_tris(model, work)
+
+    wp.capture_if(c.stale, find)
+
+
+def _choose_skin(model: Model, x1: wp.array, work: Work) -> None:
+    c = work.candidates
+    chunks = -(-model.n_vert // int(candidates.CHUNK))
+    wp.launch(candidates.fastest, dim=chunks, inputs=[c.x, x1], outputs=[c.motion])
+    wp.launch(candidates.set_skin, dim=1, inputs=[c.edge], outputs=[c.motion, c.stale, c.skin])
+
+
+def _find_near(model: Model, work: Work) -> None:
+    """Set ``near``: the bodies that may touch, which parts of theirs, and both Bvhs."""
+    c, of = work.candidates, work.near
+    launch_body_boxes(model, c.x, c.skin, work.lower, work.upper)
+    work.bodies.refit()
+    wp.launch(
+        near.near_bodies,
+        dim=model.n_body,
+        inputs=[model.cell, c.skin, work.bodies.id, model.body_world, model.body_vert]
+        + [work.lower, work.upper, c.x],
+        outputs=[of.n_near, of.near, of.slab, of.end],
+    )
+    launch_triangle_boxes(model, c.x, c.skin, of.n_near, work.tri_lower, work.tri_upper)
+    work.surface.refit()
+    c.n_found.zero_()
+    wp.launch(
+        near.near_parts,
+        dim=of.near.shape,
+        inputs=[c.skin, work.surface.id, model.body_vert, model.tris, of, c.x],
+        outputs=[of.vert_lower, of.vert_upper, of.tri_lower, of.tri_upper, of.tris]
+        + [c.near_tri, c.n_found],
+    )
+    wp.launch(
+        near.fits,
+        dim=1,
+        inputs=[work.capacity.near],
+        outputs=[c.n_found, work.contacts.needed[6:7]],
+    )
+
+
+def _find_tets(model: Model, work: Work) -> None:
+    """Set the pairs of vertices and bodies, and their tets."""
+    c = work.candidates
+    of = work.near
+    work.cell_start.zero_()
+    wp.launch(
+        hashing.count_cells,
+        dim=model.n_vert,
+        inputs=[model.cell, c.skin, model.vert_body, of, c.x],
+        outputs=[work.key, work.cell_start],
+    )
+    wp.utils.array_scan(work.cell_start, work.cell_start, inclusive=True)
+    wp.launch(
+        hashing.fill_cells,
+        dim=model.n_vert,
+        inputs=[work.key],
+        outputs=[work.cell_start, work.cell_vert],
+    )
+    c.n_found.zero_()
+    wp.launch(
+        hashing.visit_tets,
+        dim=model.n_tet,
+        inputs=[model.cell, c.skin, model.tets, model.vert_body, of]
+        + [work.cell_start, work.cell_vert, c.x],
+        outputs=[c.vert_tet, c.n_found],
+    )
+    if model.n_plane:
+        wp.launch(
+            hashing.visit_planes,
+            dim=model.n_surf,
+            inputs=[model.n_tet, c.skin, model.surf, model.plane_n, model.plane_h, c.x],
+            outputs=[c.vert_tet, c.n_found],
+        )
+    _by_pair(c.n_found, c.vert_tet, model.tet_body, c.verts, work.contacts.needed[2:4])
+
+
+def _find_tris(model: Model, work: Work) -> None:
+    """Set the pairs of surface edges and bodies, and their triangles."""
+    c = work.candidates
+    of = work.near
+    c.n_found.zero_()
+    wp.launch(
+        candidates.visit_edges,
+        dim=model.n_edge,
+        inputs=[c.skin, work.surface.id, model.tris, model.edges, model.vert_body, of]
+        + [c.near_tri, work.tri_lower, work.tri_upper, c.x],
+        outputs=[c.edge_tri, c.n_found],
+    )
+    _by_pair(c.n_found, c.edge_tri, model.tri_body, c.edges, work.contacts.needed[4:6])
+
+
+def _by_pair(
+    n_found: wp.array, found: wp.array, item_body: wp.array, pairs: Pairs, needed: wp.array
+) -> None:
+    """Sort the items found by owner and body; ``needed`` is that of the pairs and the items."""
+    n_owner = pairs.start.shape[0] - 1
+    pairs.item_start.zero_()
+    wp.launch(
+        kernels.count_items,
+        dim=found.shape[0],
+        inputs=[n_found, found],
+        outputs=[pairs.item_start, needed[1:2]],
+    )
+    wp.utils.array_scan(pairs.item_start, pairs.item_start, inclusive=True)
+    wp.launch(
+        kernels.fill_items,
+        dim=found.shape[0],
+        inputs=[n_found, found],
+        outputs=[pairs.item_start, pairs.item],
+    )
+    wp.launch(
+        kernels.count_pairs,
+        dim=n_owner,
+        inputs=[item_body, pairs.item_start],
+        outputs=[pairs.item, pairs.start],
+    )
+    wp.utils.array_scan(pairs.start, pairs.start, inclusive=False)
+    wp.launch(
+        kernels.list_pairs,
+        dim=n_owner,
+        inputs=[item_body, pairs.item_start, pairs.item, pairs.start],
+        outputs=[pairs.n, pairs.pair, pairs.items, needed[0:1]],
+    )

@@ -7,6 +7,9 @@ the other half is for what impulses and the closure add to the prediction within
 
     skin = SPAN times the largest motion in a step, between LEAST and MOST of the shortest edge [m]
 
+Most candidates are not close to touching. A pair that is found apart by some distance sleeps until
+both bodies have come that way together; ``way`` adds up the largest motion of a body in each look.
+
 An edge and a triangle are candidates unless an axis separates them by more than two skins. Threads
 append what they find to a list in any order; pairs.py sorts it.
 """
@@ -22,7 +25,8 @@ wp.set_module_options({"enable_backward": False})
 SPAN = wp.constant(6.0)  # half of it is the number of steps that candidates last
 LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
 MOST = wp.constant(0.1)  # of the shortest edge: longer lists cost more than they save
-FEWEST = wp.constant(3.0)  # largest motions in a step that the skin must hold all the same
+FEWEST = wp.constant(2.2)  # largest motions in a step that the skin must hold all the same
+CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the maximum
 
 
@@ -76,43 +80,86 @@ def set_skin(
     stale[0] = 0
 
 
+@wp.kernel
+def track(
+    # in
+    vert_body: wp.array[int],  # (n_vert,)
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # in, out
+    last: wp.array[wp.vec3],  # (n_vert,) [m] positions of the last look
+    # out, added to
+    motion: wp.array[float],  # (n_body,) [m] largest motion since then
+):
+    """One thread per CHUNK of vertices."""
+    first = wp.tid() * CHUNK
+    body = vert_body[first]
+    largest = float(0.0)
+    for i in range(first, wp.min(first + CHUNK, x.shape[0])):
+        if vert_body[i] != body:
+            wp.atomic_max(motion, body, largest)
+            body = vert_body[i]
+            largest = 0.0
+        largest = wp.max(largest, wp.length(x[i] - last[i]))
+        last[i] = x[i]
+    wp.atomic_max(motion, body, largest)
+
+
+@wp.kernel
+def go_on(
+    # in, out
+    motion: wp.array[float],  # (n_body,) [m] 0 on return
+    way: wp.array[float],  # (n_body + n_plane,) [m]
+):
+    """One thread per body."""
+    m = wp.tid()
+    way[m] = way[m] + motion[m]
+    motion[m] = 0.0
+
+
 @wp.func
-def apart(
-    axis: wp.vec3, p: wp.vec3, q: wp.vec3, b: wp.vec3, c: wp.vec3, reach: float
-) -> bool:  # relative to corner a of the triangle
-    """Whether the axis separates pq from the triangle 0bc by more than the reach."""
+def gap_along(
+    axis: wp.vec3, p: wp.vec3, q: wp.vec3, b: wp.vec3, c: wp.vec3
+) -> float:  # relative to corner a of the triangle
+    """Gap between pq and the triangle 0bc along an axis, not above 0 where they overlap."""
+    size = wp.length(axis)
+    if size == 0.0:
+        return 0.0
     sp = wp.dot(axis, p)
     sq = wp.dot(axis, q)
     sb = wp.dot(axis, b)
     sc = wp.dot(axis, c)
     lo = wp.min(wp.min(sb, sc), 0.0)
     hi = wp.max(wp.max(sb, sc), 0.0)
-    return wp.max(wp.min(sp, sq) - hi, lo - wp.max(sp, sq)) > reach * wp.length(axis)
+    return wp.max(wp.min(sp, sq) - hi, lo - wp.max(sp, sq)) / size
 
 
 @wp.func
-def may_cross(p: wp.vec3, q: wp.vec3, t: wp.vec3i, reach: float, x: wp.array[wp.vec3]) -> bool:
-    """Whether no axis of the separating axis theorem keeps pq and triangle t apart by the reach."""
+def gap_to(p: wp.vec3, q: wp.vec3, t: wp.vec3i, enough: float, x: wp.array[wp.vec3]) -> float:
+    """Gap [m] of pq to triangle t along an axis of the separating axis theorem.
+
+    Along the first axis with enough, else the largest: a distance that they keep.
+    """
     a = x[t[0]]
+    u = p - a
+    v = q - a
+    b = x[t[1]] - a
+    c = x[t[2]] - a
     d = q - p
-    ab = x[t[1]] - a
-    ac = x[t[2]] - a
-    n = wp.cross(ab, ac)
-    if apart(n, p - a, q - a, ab, ac, reach):
-        return False
-    if apart(wp.cross(n, d), p - a, q - a, ab, ac, reach):
-        return False
-    e = ab
+    n = wp.cross(b, c)
+    gap = gap_along(n, u, v, b, c)
+    if gap <= enough:
+        gap = wp.max(gap, gap_along(wp.cross(n, d), u, v, b, c))
+    e = b
     for k in range(3):
         if k == 1:
-            e = ac
+            e = c
         if k == 2:
-            e = ac - ab
-        if apart(wp.cross(n, e), p - a, q - a, ab, ac, reach):
-            return False
-        if apart(wp.cross(d, e), p - a, q - a, ab, ac, reach):
-            return False
-    return True
+            e = c - b
+        if gap <= enough:
+            gap = wp.max(gap, gap_along(wp.cross(d, e), u, v, b, c))
+        if gap <= enough:
+            gap = wp.max(gap, gap_along(wp.cross(n, e), u, v, b, c))
+    return gap
 
 
 @wp.kernel
@@ -146,7 +193,7 @@ def visit_edges(
                     for c in range(of.tris[m, k][0], of.tris[m, k][1]):
                         t = near_tri[c]
                         if boxes_meet(own.lo, own.hi, lower[t], upper[t]):
-                            if may_cross(p, q, tris[t], 2.0 * skin[0], x):
+                            if gap_to(p, q, tris[t], 2.0 * skin[0], x) <= 2.0 * skin[0]:
                                 append(e, t, found, n_found)
     else:
         body = next_near(m, -1, own, of)
@@ -155,6 +202,6 @@ def visit_edges(
             root = wp.bvh_get_group_root(surface, body)
             query = wp.bvh_query_aabb(surface, own.lo, own.hi, root)
             while wp.bvh_query_next(query, t):
-                if may_cross(p, q, tris[t], 2.0 * skin[0], x):
+                if gap_to(p, q, tris[t], 2.0 * skin[0], x) <= 2.0 * skin[0]:
                     append(e, t, found, n_found)
             body = next_near(m, body, own, of)

@@ -18,6 +18,7 @@ contact: the vertex has one of its own, but where two rims cross it lies beside 
 
 import warp as wp
 
+from warp_contact.kernels.candidates import CAREFUL, gap_to
 from warp_contact.kernels.geometry import (
     NONE,
     lines_closest,
@@ -136,11 +137,7 @@ def crossing_of(
     """First entering crossing of pq and the first leaving one after it."""
     out = no_crossing()
     for k in range(among[0], among[1]):
-        t = tris[tri[k]]
-        a = x[t[0]]
-        n = wp.cross(x[t[1]] - a, x[t[2]] - a)
-        if wp.dot(n, p - a) * wp.dot(n, q - a) <= 0.0:  # most lie on one side
-            out = with_tri(out, tri[k], tris, x, p, q - p)
+        out = with_tri(out, tri[k], tris, x, p, q - p)
     if starts_inside(out):
         rest = no_crossing()
         start = out.enter.t
@@ -150,6 +147,26 @@ def crossing_of(
                 rest = with_tri(rest, tri[k], tris, x, inner, q - inner)
         out.leave = rest.leave
         out.leave.t = start + (1.0 - start) * rest.leave.t
+    return out
+
+
+@wp.func
+def clearance(
+    among: wp.vec2i,
+    enough: float,  # [m]
+    tri: wp.array[int],
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+    q: wp.vec3,
+) -> float:
+    """A distance [m] that pq keeps from all triangles, 0 where it may cross one."""
+    out = float(NONE)
+    for k in range(among[0], among[1]):
+        gap = gap_to(p, q, tris[tri[k]], enough, x)
+        if not gap > 0.0:
+            return 0.0
+        out = wp.min(out, gap)
     return out
 
 
@@ -237,9 +254,13 @@ def find_crossings(
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     edges: wp.array[wp.vec4i],  # (n_edge,)
+    vert_body: wp.array[int],  # (n_vert,)
     body_edge: wp.array[float],  # (n_body,) [m]
+    way: wp.array[float],  # (n_body,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # in, out
+    wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no crossing
     # out
     crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact
 ):
@@ -248,12 +269,18 @@ def find_crossings(
     crossing[c] = 0
     if c >= n_pair[0]:
         return
-    e = edges[pair[c][0]]
+    i = edges[pair[c][0]][0]
+    j = edges[pair[c][0]][1]
     body = pair[c][1]
+    spent = way[vert_body[i]] + way[body]
+    if spent < wake[c]:
+        return
+    clear = clearance(pair_tris[c], skin[0], tri, tris, x, x[i], x[j])
+    wake[c] = spent + CAREFUL * clear
+    if clear > 0.0:
+        return
     edge = body_edge[body]
-    found = edge_contact(
-        surface, body, edge, fresh, skin[0], pair_tris[c], tri, tris, x0, x, e[0], e[1]
-    )
+    found = edge_contact(surface, body, edge, fresh, skin[0], pair_tris[c], tri, tris, x0, x, i, j)
     if found.found:
         crossing[c] = 1
 

@@ -5,9 +5,26 @@ Hits keep the order of their candidates: by vertex, then by body, planes last.
 
 import warp as wp
 
-from warp_contact.kernels.geometry import tet_weights
+from warp_contact.kernels.candidates import CAREFUL
+from warp_contact.kernels.geometry import NONE, tet_weights
 
 wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def distance(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3) -> float:
+    """A distance [m] that x keeps from the planes of a tet's faces, 0 from one that is inverted."""
+    n1 = wp.cross(b - a, d - a)
+    n2 = wp.cross(d - a, c - a)
+    n3 = wp.cross(c - a, b - a)
+    n4 = wp.cross(c - b, d - b)
+    out = wp.max(
+        wp.max(wp.dot(n1, x - a) / wp.length(n1), wp.dot(n2, x - a) / wp.length(n2)),
+        wp.max(wp.dot(n3, x - a) / wp.length(n3), wp.dot(n4, x - b) / wp.length(n4)),
+    )
+    if out > 0.0 and wp.dot(n4, a - b) < 0.0:
+        return out
+    return 0.0
 
 
 @wp.kernel
@@ -19,9 +36,13 @@ def find_hits(
     tet: wp.array[int],  # (capacity,)
     n_body: int,
     tets: wp.array[wp.vec4i],  # (n_tet,)
+    vert_body: wp.array[int],  # (n_vert,)
     plane_n: wp.array[wp.vec3],  # (n_plane,)
     plane_h: wp.array[float],  # (n_plane,) [m]
+    way: wp.array[float],  # (n_body + n_plane,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # in, out
+    wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no hit
     # out
     hit: wp.array[int],  # (capacity + 1,) 1 for a hit
 ):
@@ -30,17 +51,25 @@ def find_hits(
     hit[c] = 0
     if c >= n_pair[0]:
         return
-    p = x[pair[c][0]]
+    i = pair[c][0]
     body = pair[c][1]
-    if body >= n_body:
-        if wp.dot(plane_n[body - n_body], p) < plane_h[body - n_body]:
-            hit[c] = 1
+    spent = way[vert_body[i]] + way[body]
+    if spent < wake[c]:
         return
-    for k in range(pair_tets[c][0], pair_tets[c][1]):
-        t = tets[tet[k]]
-        if wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0:
+    wake[c] = -1.0
+    clear = float(NONE)
+    if body >= n_body:
+        clear = wp.dot(plane_n[body - n_body], x[i]) - plane_h[body - n_body]
+        if clear < 0.0:
             hit[c] = 1
             return
+    for k in range(pair_tets[c][0], wp.where(body < n_body, pair_tets[c][1], 0)):
+        t = tets[tet[k]]
+        if wp.min(tet_weights(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0:
+            hit[c] = 1
+            return
+        clear = wp.min(clear, distance(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]]))
+    wake[c] = spent + CAREFUL * clear
 
 
 @wp.kernel

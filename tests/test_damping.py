@@ -97,7 +97,7 @@ def test_a_mode_shrinks_by_the_stability_polynomial(
     np.testing.assert_allclose(damp(model, x, mode, dt, stages), factor * mode, atol=atol)
 
 
-def test_no_mode_is_turned_round_or_frozen():
+def test_no_mode_is_turned_round():
     z = np.linspace(0.0, 1.0, 10001)[:-1]
     for stages in range(1, 20):
         factor = (1.0 + Legendre.basis(stages)(1.0 - 2.0 * z)) / 2.0

@@ -15,12 +15,29 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
 
     def find() -> None:
         wp.copy(c.x, x0)
+        wp.copy(c.last, x0)
+        c.way.zero_()
+        c.verts.wake.fill_(-1.0)
+        c.edges.wake.fill_(-1.0)
         _choose_skin(model, x1, work)
         _find_near(model, work)
         _find_tets(model, work)
         _find_tris(model, work)
 
     wp.capture_if(c.stale, find)
+
+
+def track(model: Model, x: wp.array, work: Work) -> None:
+    """Let the bodies go on to ``x``, where candidates are looked at."""
+    c = work.candidates
+    chunks = -(-model.n_vert // int(candidates.CHUNK))
+    wp.launch(
+        candidates.track,
+        dim=chunks,
+        inputs=[model.vert_body, x],
+        outputs=[c.last, c.body_motion],
+    )
+    wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=[c.body_motion, c.way])
 
 
 def _choose_skin(model: Model, x1: wp.array, work: Work) -> None:

@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from warp_contact import candidates
 from warp_contact.kernels import crossing, hits
 from warp_contact.types import Model
 from warp_contact.work import Work
@@ -9,13 +10,14 @@ from warp_contact.work import Work
 
 def find_hits(model: Model, x: wp.array, work: Work) -> None:
     """Set the hits at ``x``, sorted by vertex and body, and ``hit_at``."""
+    candidates.track(model, x, work)
     c = work.candidates.verts
     wp.launch(
         hits.find_hits,
         dim=work.capacity.verts + 1,
         inputs=[c.n, c.pair, c.items, c.item, model.n_body, model.tets]
-        + [model.plane_n, model.plane_h, x],
-        outputs=[work.hit_at],
+        + [model.vert_body, model.plane_n, model.plane_h, work.candidates.way, x],
+        outputs=[c.wake, work.hit_at],
     )
     wp.utils.array_scan(work.hit_at, work.hit_at, inclusive=False)
     wp.launch(
@@ -28,12 +30,14 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
 
 def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Set ``crossing_at``: edges across another body at ``x`` in a step from ``x0``."""
+    candidates.track(model, x, work)
     c = work.candidates.edges
     wp.launch(
         crossing.find_crossings,
         dim=work.capacity.edges + 1,
         inputs=[fresh, work.candidates.skin, c.n, c.pair, c.items, c.item, work.surface.id]
-        + [model.tris, model.edges, model.body_edge, x0, x],
-        outputs=[work.crossing_at],
+        + [model.tris, model.edges, model.vert_body, model.body_edge]
+        + [work.candidates.way, x0, x],
+        outputs=[c.wake, work.crossing_at],
     )
     wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)

@@ -72,7 +72,7 @@ def damp(
 
     Solves M dv/dt = -C(x) v in ``stages`` stages of ``motion.relax``: stable for
     2 dt lambda_max(M^-1 C) <= stages^2 + stages, see ``stages_for``. Momentum is kept, no mode
-    grows, turns round or freezes, fixed vertices keep their velocity. Scratch: ``f_tet``
+    grows or turns round, fixed vertices keep their velocity. Scratch: ``f_tet``
     (n_tet, 4) and two arrays (n_vert,). Without a damped body nothing is launched.
     """
     if stages == 0 or not any(e.damped for e in model.elements):

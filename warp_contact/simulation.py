@@ -21,6 +21,7 @@ from warp_contact.work import Work, allocate_work
 
 SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
+UNSTABLE_DAMPED = 1.4  # the same with damping, see kernels/motion.py
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
 TRAVEL = 0.025  # of the shortest mean edge: the same, for an impact without a trace of overlap
 PATIENCE = 2.0  # stable steps, at most, that such an impact is worth
@@ -135,7 +136,8 @@ class Simulation:
                     continue
                 self._check_finite()
                 after = self._spectra()
-                steady = self._wanted is not None or dt * after[0] <= UNSTABLE
+                limit = UNSTABLE_DAMPED if rate > 0.0 else UNSTABLE
+                steady = self._wanted is not None or dt * after[0] <= limit
                 if steady and stages_for(after[1] / MARGIN, dt) <= stages_for(rate, dt):
                     break
                 omega, rate = max(1.2 * omega, after[0]), max(rate, after[1])

@@ -85,11 +85,14 @@ def kick(model: Model, state: State, work: Work) -> None:
 
 
 def predict(model: Model, state: State, work: Work, stages: int) -> None:
-    """Kick ``state.v``, damp it, set ``work.x`` = x + h v."""
-    kick(model, state, work)
+    """Damp ``state.v``, kick it, set ``work.x`` = x + h v.
+
+    In this order: damping after the kick would hand the forces of vertices at rest in a contact on
+    to their neighbours before the impulses see them, and rest would depend on the damping.
+    """
     if stages > 0:
         damp(model, state.x, state.v, work.dt, work.f_tet, (work.v, work.s), stages)
-        drift(model, state, work, work.x)
+    kick(model, state, work)
 
 
 def drift(model: Model, state: State, work: Work, out: wp.array) -> None:

@@ -137,6 +137,7 @@ class Pairs:
         items: first and end of each pair in ``item``, shape (capacity,)
         item: tets or triangles, ascending for each owner, shape (capacity of items,)
         item_start: first item of each owner, shape (n_owner + 1,)
+        wake: way of owner and body up to which they do not meet [m], shape (capacity,)
     """
 
     n: wp.array
@@ -145,6 +146,7 @@ class Pairs:
     items: wp.array
     item: wp.array
     item_start: wp.array
+    wake: wp.array
 
 
 @dataclass
@@ -159,6 +161,9 @@ class Candidates:
         edge: shortest mean edge of a body [m]
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
+        last: positions of the last look [m], shape (n_vert,)
+        body_motion: largest motion of each body since then [m], shape (n_body,)
+        way: sum of these since the candidates were found [m], shape (n_body + n_plane,)
         n_found: length of the list that is being filled, shape (1,)
         vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
         near_tri: triangles in the slabs of near bodies, shape (capacity.near,)
@@ -171,6 +176,9 @@ class Candidates:
     edge: float
     verts: Pairs
     edges: Pairs
+    last: wp.array
+    body_motion: wp.array
+    way: wp.array
     n_found: wp.array
     vert_tet: wp.array
     edge_tri: wp.array

@@ -217,6 +217,9 @@ def _allocate_candidates(model: Model, capacity: Capacity) -> Candidates:
         edge=float(model.body_edge.numpy().min()),
         verts=_allocate_pairs(model.n_vert, capacity.verts, capacity.tets),
         edges=_allocate_pairs(model.n_edge, capacity.edges, capacity.tris),
+        last=_vectors(model.n_vert),
+        body_motion=_floats(model.n_body),
+        way=_floats(model.n_body + model.n_plane),
         n_found=_ints(1),
         vert_tet=wp.zeros(capacity.tets, dtype=wp.vec2i),
         edge_tri=wp.zeros(capacity.tris, dtype=wp.vec2i),
@@ -232,6 +235,7 @@ def _allocate_pairs(n_owner: int, n_pair: int, n_item: int) -> Pairs:
         items=wp.zeros(n_pair, dtype=wp.vec2i),
         item=_ints(n_item),
         item_start=_ints(n_owner + 1),
+        wake=_floats(n_pair),
     )
 
 

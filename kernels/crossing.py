@@ -13,7 +13,8 @@ is left for the face when it would have overlapped more at the start of the step
 have passed each other.
 
 With one end inside, the triangle closest to that end stands for t2, and only a ridge makes a
-contact: the vertex has one of its own, but where two rims cross it lies beside the overlap.
+contact: the vertex has one of its own, but where two rims cross it lies beside the overlap. It is
+dropped when it would have overlapped before: the edge touches a corner from the side.
 """
 
 import warp as wp
@@ -239,6 +240,8 @@ def edge_contact(
         hit = closest_of(surface, body, sure, reach, among, tri, tris, x, p)
         if hit.tri >= 0:
             out = on_ridge(p, q, tris[hit.tri], tris[leave.tri], x)
+    if fresh and out.found and start_gap(out, i, j, x0) < -STALE * edge:
+        out.found = False
     return out
 
 

@@ -110,17 +110,27 @@ def visit_cells(
     reach: float,
     tets: wp.array[wp.vec4i],
     vert_body: wp.array[int],
+    body_vert: wp.array[int],
     cell_start: wp.array[int],
     cell_vert: wp.array[int],
     x: wp.array[wp.vec3],
     found: wp.array[wp.vec2i],
     n_found: wp.array[int],
 ):
-    """Append the vertices of body m in the box from lo to hi that tet q may come to hold."""
+    """Append the vertices of body m in the box from lo to hi that tet q may come to hold.
+
+    Where the box has more cells than the body has vertices, these are tried one by one.
+    """
     a = x[tets[q][0]]
     b = x[tets[q][1]]
     c = x[tets[q][2]]
     d = x[tets[q][3]]
+    n = (hi - lo) / size + wp.vec3(1.0, 1.0, 1.0)
+    if not n[0] * n[1] * n[2] <= float(body_vert[m + 1] - body_vert[m]):  # or not finite
+        for i in range(body_vert[m], body_vert[m + 1]):
+            if in_box(x[i], lo, hi) and may_hold(x[i], a, b, c, d, reach):
+                append(i, q, found, n_found)
+        return
     first = cell_of(lo, size)
     last = cell_of(hi, size)
     for ci in range(first[0], last[0] + 1):
@@ -142,6 +152,7 @@ def visit_tets(
     skin: wp.array[float],  # (1,) [m]
     tets: wp.array[wp.vec4i],  # (n_tet,)
     vert_body: wp.array[int],  # (n_vert,)
+    body_vert: wp.array[int],  # (n_body + 1,)
     of: Near,
     cell_start: wp.array[int],  # (n_cell + 1,)
     cell_vert: wp.array[int],  # (n_vert,)
@@ -167,8 +178,8 @@ def visit_tets(
                     hi = wp.min(own.hi + grow, of.vert_upper[m, k])
                     body = of.near[m, k]
                     visit_cells(
-                        q, body, size, lo, hi, reach, tets, vert_body, cell_start, cell_vert,
-                        x, found, n_found
+                        q, body, size, lo, hi, reach, tets, vert_body, body_vert, cell_start,
+                        cell_vert, x, found, n_found
                     )  # fmt: skip
     else:
         body = next_near(m, -1, own, of)
@@ -176,8 +187,8 @@ def visit_tets(
             lo = wp.max(own.lo - grow, of.lower[body])
             hi = wp.min(own.hi + grow, of.upper[body])
             visit_cells(
-                q, body, size, lo, hi, reach, tets, vert_body, cell_start, cell_vert,
-                x, found, n_found
+                q, body, size, lo, hi, reach, tets, vert_body, body_vert, cell_start,
+                cell_vert, x, found, n_found
             )  # fmt: skip
             body = next_near(m, body, own, of)
 

@@ -12,8 +12,8 @@ Damping M dv/dt = -C v over h, in s stages of RKL1 over 2 h and half way back:
     Y_0 = v,  Y_j = (2j-1)/j Y_{j-1} - (j-1)/j Y_{j-2} - (2j-1)/j 4h/(s^2+s) M^-1 C Y_{j-1}
     v' = (v + Y_s) / 2 = p v,  p = (1 + P_s(1 - 4 z/(s^2+s))) / 2,  z = h L, L of M^-1 C
 
-with P_s Legendre. p = 1 - z + O(z^2), and 0 < p <= 1 for 2 z < s^2 + s. Damping comes first, so that
-rest does not depend on it, and Euler is v' = p v - h w^2 x, x' = x + h v': stable for p > -1 and
+with P_s Legendre. p = 1 - z + O(z^2), and 0 < p <= 1 for 2 z < s^2 + s. Damping comes first, so
+that rest does not depend on it, and Euler is v' = p v - h w^2 x, x' = x + h v': stable for
 (h w)^2 < 2 (1 + p).
 
 Source of RKL1: Meyer, Balsara, Aslam 2014, "A stabilized Runge-Kutta-Legendre method for

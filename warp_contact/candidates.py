@@ -99,7 +99,7 @@ def _find_tets(model: Model, work: Work) -> None:
     wp.launch(
         hashing.visit_tets,
         dim=model.n_tet,
-        inputs=[model.cell, c.skin, model.tets, model.vert_body, of]
+        inputs=[model.cell, c.skin, model.tets, model.vert_body, model.body_vert, of]
         + [work.cell_start, work.cell_vert, c.x],
         outputs=[c.vert_tet, c.n_found],
     )

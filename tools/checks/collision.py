@@ -106,9 +106,9 @@ def quaternion(angles) -> np.ndarray:
     )
 
 
-def collide(scene: wc.Scene) -> dict[str, float]:
+def collide(scene: wc.Scene, response=None) -> dict[str, float]:
     """Run until the blocks are apart again; the worst of each figure."""
-    sim = wc.Simulation(scene, fps=FPS)
+    sim = wc.Simulation(scene, response, fps=FPS)
     start, first = Motion.of(sim), sim.measure().energy
     edge = float(sim.model.body_edge.numpy().min())
     worst = np.zeros(len(TARGETS))

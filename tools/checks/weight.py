@@ -33,7 +33,12 @@ def run(quick: bool) -> Iterator[Row]:
 
 
 def settle(
-    case: str, cells: int, upper: int | None, ratio: float, rotation: tuple | None
+    case: str,
+    cells: int,
+    upper: int | None,
+    ratio: float,
+    rotation: tuple | None,
+    response=None,
 ) -> Iterator[Row]:
     """Let a stack come to rest, then watch the forces between all that touches."""
     scene = wc.Scene(gravity=(0.0, 0.0, -GRAVITY))
@@ -49,7 +54,7 @@ def settle(
         place = (0.0, 0.0, 1.5 * EDGE + 2.0 * GAP)
         rotation = rotation or (0.0, 0.0, 0.0, 1.0)
         scene.add_body(wc.box(EDGE, upper), material, place, rotation, label="upper")
-    sim = wc.Simulation(scene, fps=FPS)
+    sim = wc.Simulation(scene, response, fps=FPS)
     for _ in sim.frames(round(SETTLE * FPS)):
         pass
     forces, overlap = {pair: [] for pair in weights}, []

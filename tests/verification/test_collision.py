@@ -1,0 +1,10 @@
+"""A6: free collisions keep momenta and never gain energy."""
+
+import pytest
+from verification import collision
+
+
+@pytest.mark.parametrize("ratio", collision.RATIOS)
+@pytest.mark.parametrize("way", collision.WAYS)
+def test_blocks_keep_their_momenta_and_gain_no_energy(way, ratio, ask, hold):
+    hold(collision.collide(ask, (3, 5), way, ratio), "excellent")

@@ -1,0 +1,53 @@
+"""Dynamic relaxation: a scene to its equilibrium, without damping in the material.
+
+After each frame of one or two steps the velocities are multiplied by s = exp(-2 zeta w / fps),
+where w is the frequency of the slowest mode: viscous damping proportional to the mass (Underwood
+1983), which vanishes at rest and so leaves the equilibrium alone. The velocities of symplectic
+Euler lag by h/2, so what is scaled is v + h/2 f/m; scaling v itself would feed fast modes. A frame
+of more steps would see modes of a whole number of half periods always at rest and never damp them.
+"""
+
+import numpy as np
+import warp as wp
+
+import warp_contact as wc
+from warp_contact import forces
+
+ZETA = 0.7  # of the slowest mode: the fastest decay without a long tail
+
+
+def step_rate(edge: float, speed: float) -> float:
+    """Frames per second [1/s] of about one stable step.
+
+    Args:
+        edge: shortest edge of a cell [m]
+        speed: of the waves [m/s]; the tets of a cell have modes of some 3.5 speed / edge
+    """
+    return 3.0 * speed / edge
+
+
+def relax(sim: wc.Simulation, omega: float, frames: int):
+    """Step ``frames`` frames, calm each, and yield its number; ``omega`` [1/s], slowest mode."""
+    factor = float(np.exp(-2.0 * ZETA * omega / sim.fps))
+    for frame in sim.frames(frames):
+        yield frame
+        calm(sim, factor)
+
+
+def calm(sim: wc.Simulation, factor: float) -> None:
+    """Multiply the velocities of mobile vertices, taken at the time of the positions."""
+    model = sim.model
+    f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3, device=sim.device)
+    ones = wp.full(model.n_tet, 1, dtype=int, device=sim.device)
+    with wp.ScopedDevice(sim.device):
+        forces.internal_forces(model, sim.state.x, ones, f_tet)
+    a = np.zeros((model.n_vert, 3))
+    np.add.at(a, model.tets.numpy().ravel(), f_tet.numpy().reshape(-1, 3).astype(float))
+    inv_mass = model.inv_mass.numpy()[:, None]
+    a = inv_mass * a + np.array(model.gravity)
+    held = sim.contact_fields()["pressure"] > 0.0  # contact balances the other forces there
+    a[held] = 0.0
+    ahead = 0.5 * a / (sim.fps * max(sim.substeps, 1))
+    v = sim.velocities()
+    calmed = factor * (v + ahead) - ahead
+    sim.state.v.assign(np.where(inv_mass > 0.0, calmed, v).astype(np.float32))

@@ -28,7 +28,7 @@ def body_boxes(
     # in
     surf: wp.array[int],  # (n_surf,)
     vert_body: wp.array[int],  # (n_vert,)
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
     lower: wp.array[wp.vec3],  # (n_body,) [m]
@@ -39,7 +39,6 @@ def body_boxes(
     body = vert_body[surf[first]]
     lo = wp.vec3(1.0e30, 1.0e30, 1.0e30)
     hi = -lo
-    grow = wp.vec3(skin[0], skin[0], skin[0])
     for k in range(first, wp.min(first + CHUNK, surf.shape[0])):
         i = surf[k]
         if vert_body[i] != body:
@@ -48,6 +47,7 @@ def body_boxes(
             body = vert_body[i]
             lo = wp.vec3(1.0e30, 1.0e30, 1.0e30)
             hi = -lo
+        grow = wp.vec3(skin[body], skin[body], skin[body])
         lo = wp.min(lo, x[i] - grow)
         hi = wp.max(hi, x[i] + grow)
     wp.atomic_min(lower, body, lo)
@@ -61,7 +61,7 @@ def triangle_boxes(
     tri_body: wp.array[int],  # (n_tri,)
     n_near: wp.array[int],  # (n_body,)
     body_edge: wp.array[float],  # (n_body,) [m]
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     lower: wp.array[wp.vec3],  # (n_tri,) [m]
@@ -75,6 +75,6 @@ def triangle_boxes(
     a = x[tris[t][0]]
     b = x[tris[t][1]]
     c = x[tris[t][2]]
-    g = skin[0] + GROW * body_edge[body]
+    g = skin[body] + GROW * body_edge[body]
     lower[t] = wp.min(wp.min(a, b), c) - wp.vec3(g, g, g)
     upper[t] = wp.max(wp.max(a, b), c) + wp.vec3(g, g, g)

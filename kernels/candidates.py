@@ -1,16 +1,17 @@
 """What may touch while nothing moves further than a skin: found once, kept for many steps.
 
-Candidates are found at the positions of some step. As long as no vertex is further than the
-skin from there, all that touches is among them, and the steps test them exactly: the same contacts
-come out as without (Verlet 1967). They are found again once some vertex has moved by half the skin;
-the other half is for what impulses and the closure add to the prediction within a step.
+Candidates are found at the positions of some step. As long as no vertex is further than the skin of
+its body from there, all that touches is among them, and the steps test them exactly: the same
+contacts come out as without (Verlet 1967). They are found again once some vertex has moved by half
+the skin; the other half is for what impulses and the closure add to the prediction within a step.
 
-    skin = SPAN times the largest motion in a step, between LEAST and MOST of the shortest edge [m]
+    skin = SPAN times the largest motion of the body in a step, from LEAST to MOST of the shortest
+           edge, and the largest motion of the bodies near it, which may push it on      [m]
 
 Most candidates are not close to touching. A pair that is found apart by some distance sleeps until
 both bodies have come that way together; ``way`` adds up the largest motion of a body in each look.
 
-An edge and a triangle are candidates unless an axis separates them by more than two skins. Threads
+An edge and a triangle are candidates unless an axis separates them by more than both skins. Threads
 append what they find to a list in any order; pairs.py sorts it.
 """
 
@@ -22,10 +23,10 @@ from warp_contact.kernels.pairs import append
 
 wp.set_module_options({"enable_backward": False})
 
-SPAN = wp.constant(6.0)  # half of it is the number of steps that candidates last
+SPAN = wp.constant(16.0)  # half of it is the number of steps that candidates last
 LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
 MOST = wp.constant(0.1)  # of the shortest edge: longer lists cost more than they save
-FEWEST = wp.constant(2.2)  # largest motions in a step that the skin must hold all the same
+FEWEST = wp.constant(6.0)  # largest motions in a step that the skin must hold all the same
 CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the maximum
 
@@ -33,7 +34,8 @@ CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the 
 @wp.kernel
 def moved(
     # in
-    skin: wp.array[float],  # (1,) [m]
+    vert_body: wp.array[int],  # (n_vert,)
+    skin: wp.array[float],  # (n_body,) [m]
     built: wp.array[wp.vec3],  # (n_vert,) [m] positions of the candidates
     x0: wp.array[wp.vec3],  # (n_vert,) [m]
     x1: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -43,40 +45,76 @@ def moved(
     """One thread per vertex: whether it has used up half of the skin."""
     i = wp.tid()
     d = wp.max(wp.length_sq(x0[i] - built[i]), wp.length_sq(x1[i] - built[i]))
-    if not d <= 0.25 * skin[0] * skin[0]:
+    half = 0.5 * skin[vert_body[i]]
+    if not d <= half * half:
         stale[0] = 1
 
 
 @wp.kernel
-def fastest(
+def largest_motions(
     # in
+    vert_body: wp.array[int],  # (n_vert,)
     x0: wp.array[wp.vec3],  # (n_vert,) [m]
     x1: wp.array[wp.vec3],  # (n_vert,) [m]
     # out, added to
-    motion: wp.array[float],  # (1,) [m]
+    motion: wp.array[float],  # (n_body,) [m] of each body in the step
+    fastest: wp.array[float],  # (1,) [m] of them all
 ):
-    """One thread per CHUNK of vertices: the largest motion in the step."""
+    """One thread per CHUNK of vertices."""
     first = wp.tid() * CHUNK
+    body = vert_body[first]
     largest = float(0.0)
-    for k in range(first, wp.min(first + CHUNK, x0.shape[0])):
-        largest = wp.max(largest, wp.length(x1[k] - x0[k]))
-    wp.atomic_max(motion, 0, largest)
+    most = float(0.0)
+    for i in range(first, wp.min(first + CHUNK, x0.shape[0])):
+        if vert_body[i] != body:
+            wp.atomic_max(motion, body, largest)
+            body = vert_body[i]
+            largest = 0.0
+        largest = wp.max(largest, wp.length(x1[i] - x0[i]))
+        most = wp.max(most, largest)
+    wp.atomic_max(motion, body, largest)
+    wp.atomic_max(fastest, 0, most)
+
+
+@wp.func
+def own_skin(motion: float, edge: float) -> float:
+    return wp.max(wp.clamp(SPAN * motion, LEAST * edge, MOST * edge), FEWEST * motion)
 
 
 @wp.kernel
-def set_skin(
+def widest_skins(
     # in
     edge: float,  # shortest mean edge of a body [m]
-    # in, out
-    motion: wp.array[float],  # (1,) [m], 0 on return
-    stale: wp.array[int],  # (1,) 0 on return
+    fastest: wp.array[float],  # (1,) [m]
+    motion: wp.array[float],  # (n_body,) [m]
     # out
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
 ):
-    """One thread."""
-    m = motion[0]
-    skin[0] = wp.max(wp.clamp(SPAN * m, LEAST * edge, MOST * edge), FEWEST * m)
-    motion[0] = 0.0
+    """One thread per body: the skin it would have next to the fastest body."""
+    m = wp.tid()
+    skin[m] = own_skin(motion[m], edge) + fastest[0]
+
+
+@wp.kernel
+def choose_skins(
+    # in
+    edge: float,  # shortest mean edge of a body [m]
+    fastest: wp.array[float],  # (1,) [m]
+    motion: wp.array[float],  # (n_body,) [m]
+    n_near: wp.array[int],  # (n_body,)
+    near: wp.array2d[int],  # (n_body, MANY)
+    # out
+    skin: wp.array[float],  # (n_body,) [m]
+    stale: wp.array[int],  # (1,) 0
+):
+    """One thread per body."""
+    m = wp.tid()
+    push = float(fastest[0])
+    if n_near[m] <= MANY:
+        push = float(0.0)
+        for k in range(n_near[m]):
+            push = wp.max(push, motion[near[m, k]])
+    skin[m] = own_skin(motion[m], edge) + push
     stale[0] = 0
 
 
@@ -165,7 +203,7 @@ def gap_to(p: wp.vec3, q: wp.vec3, t: wp.vec3i, enough: float, x: wp.array[wp.ve
 @wp.kernel
 def visit_edges(
     # in
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
     edges: wp.array[wp.vec4i],  # (n_edge,)
@@ -185,23 +223,25 @@ def visit_edges(
     m = vert_body[edges[e][0]]
     p = x[edges[e][0]]
     q = x[edges[e][1]]
-    own = part(p, p, q, q, skin[0])
+    own = part(p, p, q, q, skin[m])
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
+            reach = skin[m] + skin[of.near[m, k]]
             if reaches(own, of.slab[m, k]):
                 if boxes_meet(own.lo, own.hi, of.tri_lower[m, k], of.tri_upper[m, k]):
                     for c in range(of.tris[m, k][0], of.tris[m, k][1]):
                         t = near_tri[c]
                         if boxes_meet(own.lo, own.hi, lower[t], upper[t]):
-                            if gap_to(p, q, tris[t], 2.0 * skin[0], x) <= 2.0 * skin[0]:
+                            if gap_to(p, q, tris[t], reach, x) <= reach:
                                 append(e, t, found, n_found)
     else:
         body = next_near(m, -1, own, of)
         while body >= 0:
+            reach = skin[m] + skin[body]
             t = int(0)
             root = wp.bvh_get_group_root(surface, body)
             query = wp.bvh_query_aabb(surface, own.lo, own.hi, root)
             while wp.bvh_query_next(query, t):
-                if gap_to(p, q, tris[t], 2.0 * skin[0], x) <= 2.0 * skin[0]:
+                if gap_to(p, q, tris[t], reach, x) <= reach:
                     append(e, t, found, n_found)
             body = next_near(m, body, own, of)

@@ -40,8 +40,8 @@ from warp_contact.kernels.surface_query import (
 
 wp.set_module_options({"enable_backward": False})
 
-# Of the skin: two skins less the way of both bodies. The impulses seldom use up the rest of it.
-SURE = wp.constant(0.25)
+# Of both skins, less the way of both bodies. The impulses seldom use up the rest of it.
+SURE = wp.constant(0.125)
 FLAT = wp.constant(2.0e-4)  # of an edge: an edge this deep lies in the face, whatever its direction
 
 
@@ -200,7 +200,7 @@ def edge_contact(
     body: int,
     edge: float,  # mean edge of the body [m]
     fresh: bool,  # there are no overlaps from before the step
-    skin: float,  # of the candidates [m]
+    reach: float,  # of the candidates: both skins [m]
     among: wp.vec2i,  # first and end of its triangles that the edge may cross
     tri: wp.array[int],
     tris: wp.array[wp.vec3i],
@@ -212,8 +212,7 @@ def edge_contact(
     """The contact of the edge from i to j with a body, if it has one."""
     p = x[i]
     q = x[j]
-    reach = 0.1 * edge
-    sure = SURE * skin
+    sure = SURE * reach
     out = EdgeContact()
     crossing = crossing_of(among, tri, tris, x, p, q)
     enter = crossing.enter
@@ -221,7 +220,7 @@ def edge_contact(
     if enter.tri >= 0 and leave.tri >= 0:
         t = 0.5 * (enter.t + leave.t)
         middle = p + t * (q - p)
-        hit = closest_of(surface, body, sure, reach, among, tri, tris, x, middle)
+        hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, middle)
         contact = on_ridge(p, q, tris[enter.tri], tris[leave.tri], x)
         if contact.found and contact.d <= 2.0 * hit.t:
             if not fresh or start_gap(contact, i, j, x0) > -STALE * edge:
@@ -233,11 +232,11 @@ def edge_contact(
         if hit.tri >= 0 and hit.t > FLAT * edge:
             return on_face(middle, t, hit, tris, x)
     elif enter.tri >= 0:
-        hit = closest_of(surface, body, sure, reach, among, tri, tris, x, q)
+        hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, q)
         if hit.tri >= 0:
             out = on_ridge(p, q, tris[enter.tri], tris[hit.tri], x)
     elif leave.tri >= 0:
-        hit = closest_of(surface, body, sure, reach, among, tri, tris, x, p)
+        hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, p)
         if hit.tri >= 0:
             out = on_ridge(p, q, tris[hit.tri], tris[leave.tri], x)
     if fresh and out.found and start_gap(out, i, j, x0) < -STALE * edge:
@@ -249,7 +248,7 @@ def edge_contact(
 def find_crossings(
     # in
     fresh: bool,  # there are no overlaps from before the step
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     n_pair: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,) edge and body
     pair_tris: wp.array[wp.vec2i],  # (capacity,) first and end in ``tri``
@@ -276,14 +275,15 @@ def find_crossings(
     j = edges[pair[c][0]][1]
     body = pair[c][1]
     spent = way[vert_body[i]] + way[body]
+    reach = skin[vert_body[i]] + skin[body]
     if spent < wake[c]:
         return
-    clear = clearance(pair_tris[c], skin[0], tri, tris, x, x[i], x[j])
+    clear = clearance(pair_tris[c], reach, tri, tris, x, x[i], x[j])
     wake[c] = spent + CAREFUL * clear
     if clear > 0.0:
         return
     edge = body_edge[body]
-    found = edge_contact(surface, body, edge, fresh, skin[0], pair_tris[c], tri, tris, x0, x, i, j)
+    found = edge_contact(surface, body, edge, fresh, reach, pair_tris[c], tri, tris, x0, x, i, j)
     if found.found:
         crossing[c] = 1
 
@@ -292,7 +292,7 @@ def find_crossings(
 def edge_contacts(
     # in
     fresh: bool,  # there are no overlaps from before the step
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     pair: wp.array[wp.vec2i],  # (capacity,) edge and body
     pair_tris: wp.array[wp.vec2i],  # (capacity,) first and end in ``tri``
     tri: wp.array[int],  # (capacity,)
@@ -321,8 +321,9 @@ def edge_contacts(
     i = edges[pair[k][0]][0]
     j = edges[pair[k][0]][1]
     body = pair[k][1]
+    reach = skin[vert_body[i]] + skin[body]
     edge = body_edge[body]
-    found = edge_contact(surface, body, edge, fresh, skin[0], pair_tris[k], tri, tris, x0, x, i, j)
+    found = edge_contact(surface, body, edge, fresh, reach, pair_tris[k], tri, tris, x0, x, i, j)
     t = found.vert
     w = found.w
     if found.ridge:

@@ -38,7 +38,7 @@ def hash_of(cell: wp.vec3i, body: int, n: int) -> int:
 def count_cells(
     # in
     size: float,  # edge of a cell [m]
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     vert_body: wp.array[int],  # (n_vert,)
     of: Near,
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -51,7 +51,7 @@ def count_cells(
     i = wp.tid()
     m = vert_body[i]
     key[i] = -1
-    if next_near(m, -1, part(x[i], x[i], x[i], x[i], skin[0]), of) >= 0:
+    if next_near(m, -1, part(x[i], x[i], x[i], x[i], skin[m]), of) >= 0:
         h = hash_of(cell_of(x[i], size), m, count.shape[0] - 1)
         key[i] = h
         wp.atomic_add(count, h, 1)
@@ -149,7 +149,7 @@ def visit_cells(
 def visit_tets(
     # in
     size: float,  # edge of a cell [m]
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     tets: wp.array[wp.vec4i],  # (n_tet,)
     vert_body: wp.array[int],  # (n_vert,)
     body_vert: wp.array[int],  # (n_body + 1,)
@@ -167,16 +167,16 @@ def visit_tets(
     m = vert_body[tets[q][0]]
     if of.n_near[m] == 0:
         return
-    own = part(x[tets[q][0]], x[tets[q][1]], x[tets[q][2]], x[tets[q][3]], skin[0])
-    reach = 2.0 * skin[0]
-    grow = wp.vec3(skin[0], skin[0], skin[0])
+    own = part(x[tets[q][0]], x[tets[q][1]], x[tets[q][2]], x[tets[q][3]], skin[m])
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
             if reaches(own, of.slab[m, k]):
                 if boxes_meet(own.lo, own.hi, of.vert_lower[m, k], of.vert_upper[m, k]):
+                    body = of.near[m, k]
+                    grow = wp.vec3(skin[body], skin[body], skin[body])
                     lo = wp.max(own.lo - grow, of.vert_lower[m, k])
                     hi = wp.min(own.hi + grow, of.vert_upper[m, k])
-                    body = of.near[m, k]
+                    reach = skin[m] + skin[body]
                     visit_cells(
                         q, body, size, lo, hi, reach, tets, vert_body, body_vert, cell_start,
                         cell_vert, x, found, n_found
@@ -184,8 +184,10 @@ def visit_tets(
     else:
         body = next_near(m, -1, own, of)
         while body >= 0:
+            grow = wp.vec3(skin[body], skin[body], skin[body])
             lo = wp.max(own.lo - grow, of.lower[body])
             hi = wp.min(own.hi + grow, of.upper[body])
+            reach = skin[m] + skin[body]
             visit_cells(
                 q, body, size, lo, hi, reach, tets, vert_body, body_vert, cell_start,
                 cell_vert, x, found, n_found
@@ -197,8 +199,9 @@ def visit_tets(
 def visit_planes(
     # in
     n_tet: int,
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     surf: wp.array[int],  # (n_surf,)
+    vert_body: wp.array[int],  # (n_vert,)
     plane_n: wp.array[wp.vec3],  # (n_plane,)
     plane_h: wp.array[float],  # (n_plane,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -210,5 +213,5 @@ def visit_planes(
     """One thread per surface vertex: the planes that it may come to pass."""
     i = surf[wp.tid()]
     for p in range(plane_n.shape[0]):
-        if wp.dot(plane_n[p], x[i]) < plane_h[p] + skin[0]:
+        if wp.dot(plane_n[p], x[i]) < plane_h[p] + skin[vert_body[i]]:
             append(i, n_tet + p, found, n_found)

@@ -46,7 +46,7 @@ def support(
 def near_bodies(
     # in
     cell: float,  # [m]
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     bodies: wp.uint64,  # Bvh over the boxes, grouped by world
     world: wp.array[int],  # (n_body,)
     body_vert: wp.array[int],  # (n_body + 1,)
@@ -72,8 +72,8 @@ def near_bodies(
         if count <= MANY and other != m:
             if boxes_meet(lower[m], upper[m], lower[other], upper[other]):
                 axis = wp.normalize((lower[other] + upper[other]) - (lower[m] + upper[m]))
-                begin = -support(other, -axis, skin[0], body_vert, lower, upper, x)
-                last = support(m, axis, skin[0], body_vert, lower, upper, x)
+                begin = -support(other, -axis, skin[other], body_vert, lower, upper, x)
+                last = support(m, axis, skin[m], body_vert, lower, upper, x)
                 if last >= begin:
                     if count < MANY:
                         k = int(count)
@@ -145,7 +145,7 @@ class Near:
 @wp.kernel
 def near_parts(
     # in
-    skin: wp.array[float],  # (1,) [m]
+    skin: wp.array[float],  # (n_body,) [m]
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     body_vert: wp.array[int],  # (n_body + 1,)
     tris: wp.array[wp.vec3i],  # (n_tri,)
@@ -168,7 +168,8 @@ def near_parts(
     body = of.near[m, k]
     s = of.slab[m, k]
     back = wp.vec4(-s[0], -s[1], -s[2], -of.end[m, k])
-    grow = wp.vec3(skin[0], skin[0], skin[0])
+    own = skin[body]
+    grow = wp.vec3(own, own, own)
     lo = wp.vec3(1.0e30, 1.0e30, 1.0e30)
     hi = -lo
     if body_vert[body + 1] - body_vert[body] > LARGE:
@@ -176,7 +177,7 @@ def near_parts(
         hi = of.upper[body]
     else:
         for i in range(body_vert[body], body_vert[body + 1]):
-            if reaches(part(x[i], x[i], x[i], x[i], skin[0]), back):
+            if reaches(part(x[i], x[i], x[i], x[i], own), back):
                 lo = wp.min(lo, x[i] - grow)
                 hi = wp.max(hi, x[i] + grow)
     vert_lower[m, k] = lo
@@ -192,7 +193,7 @@ def near_parts(
         query = wp.bvh_query_aabb(surface, of.lower[m], of.upper[m], root)
         while wp.bvh_query_next(query, t):
             c = x[tris[t][2]]
-            p = part(x[tris[t][0]], x[tris[t][1]], c, c, skin[0])
+            p = part(x[tris[t][0]], x[tris[t][1]], c, c, own)
             if reaches(p, back):
                 if fill == 1:
                     near_tri[first + n] = t

@@ -70,12 +70,12 @@ def test_two_runs_agree_in_every_bit(response):
 
 
 def test_the_order_of_the_bodies_does_not_matter():
-    one = run(heap(damping=1e-3), 6)
-    two = run(heap(damping=1e-3, order=(2, 0, 1)), 6)
+    one = run(heap(damping=1e-3), 4)
+    two = run(heap(damping=1e-3, order=(2, 0, 1)), 4)
     assert met(one) and met(two)
     for k, at in ((0, 1), (1, 2), (2, 0)):
         # Sums over contacts round in another order; then a contact comes or goes a step earlier:
-        # some resting gaps, 5e-5 m. Bodies have moved by 0.04 m.
+        # some resting gaps, 5e-5 m. Bodies have moved by 0.03 m.
         np.testing.assert_allclose(one.positions(k), two.positions(at), atol=2e-4)
 
 

@@ -11,7 +11,12 @@ from warp_contact.work import Work, launch_body_boxes, launch_triangle_boxes
 def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     """Find the candidates at ``x0`` unless those at hand hold for a step from ``x0`` to ``x1``."""
     c = work.candidates
-    wp.launch(candidates.moved, dim=model.n_vert, inputs=[c.skin, c.x, x0, x1], outputs=[c.stale])
+    wp.launch(
+        candidates.moved,
+        dim=model.n_vert,
+        inputs=[model.vert_body, c.skin, c.x, x0, x1],
+        outputs=[c.stale],
+    )
 
     def find() -> None:
         wp.copy(c.x, x0)
@@ -19,8 +24,8 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
         c.way.zero_()
         c.verts.wake.fill_(-1.0)
         c.edges.wake.fill_(-1.0)
-        _choose_skin(model, x1, work)
-        _find_near(model, work)
+        _choose_skins(model, x1, work)
+        _find_parts(model, work)
         _find_tets(model, work)
         _find_tris(model, work)
 
@@ -40,15 +45,32 @@ def track(model: Model, x: wp.array, work: Work) -> None:
     wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=[c.body_motion, c.way])
 
 
-def _choose_skin(model: Model, x1: wp.array, work: Work) -> None:
+def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
+    """Set ``skin`` for a step to ``x1``, ``near`` and the boxes of the bodies."""
     c = work.candidates
     chunks = -(-model.n_vert // int(candidates.CHUNK))
-    wp.launch(candidates.fastest, dim=chunks, inputs=[c.x, x1], outputs=[c.motion])
-    wp.launch(candidates.set_skin, dim=1, inputs=[c.edge], outputs=[c.motion, c.stale, c.skin])
+    c.motion.zero_()
+    c.fastest.zero_()
+    wp.launch(
+        candidates.largest_motions,
+        dim=chunks,
+        inputs=[model.vert_body, c.x, x1],
+        outputs=[c.motion, c.fastest],
+    )
+    moving = [c.edge, c.fastest, c.motion]
+    wp.launch(candidates.widest_skins, dim=model.n_body, inputs=moving, outputs=[c.skin])
+    _find_near(model, work)
+    wp.launch(
+        candidates.choose_skins,
+        dim=model.n_body,
+        inputs=[*moving, work.near.n_near, work.near.near],
+        outputs=[c.skin, c.stale],
+    )
+    _find_near(model, work)
 
 
 def _find_near(model: Model, work: Work) -> None:
-    """Set ``near``: the bodies that may touch, which parts of theirs, and both Bvhs."""
+    """Set the bodies that may touch, within their skins, and their Bvh."""
     c, of = work.candidates, work.near
     launch_body_boxes(model, c.x, c.skin, work.lower, work.upper)
     work.bodies.refit()
@@ -59,6 +81,11 @@ def _find_near(model: Model, work: Work) -> None:
         + [work.lower, work.upper, c.x],
         outputs=[of.n_near, of.near, of.slab, of.end],
     )
+
+
+def _find_parts(model: Model, work: Work) -> None:
+    """Set which parts of near bodies may touch, and the Bvh over the triangles."""
+    c, of = work.candidates, work.near
     launch_triangle_boxes(model, c.x, c.skin, of.n_near, work.tri_lower, work.tri_upper)
     work.surface.refit()
     c.n_found.zero_()
@@ -107,7 +134,15 @@ def _find_tets(model: Model, work: Work) -> None:
         wp.launch(
             hashing.visit_planes,
             dim=model.n_surf,
-            inputs=[model.n_tet, c.skin, model.surf, model.plane_n, model.plane_h, c.x],
+            inputs=[
+                model.n_tet,
+                c.skin,
+                model.surf,
+                model.vert_body,
+                model.plane_n,
+                model.plane_h,
+                c.x,
+            ],
             outputs=[c.vert_tet, c.n_found],
         )
     _by_pair(c.n_found, c.vert_tet, model.tet_body, c.verts, work.contacts.needed[2:4])

@@ -145,7 +145,7 @@ class Meter:
             sizes = model.n_body, model.n_tri, model.n_tet
             self._boxes = [(wp.zeros(n, dtype=wp.vec3), wp.zeros(n, dtype=wp.vec3)) for n in sizes]
             self._near = wp.full(model.n_body, 1, dtype=int)
-            self._skin = wp.zeros(1, dtype=float)
+            self._skin = wp.zeros(model.n_body, dtype=float)
         of_body, of_tri, of_tet = self._boxes
         launch_body_boxes(model, x, self._skin, *of_body)
         launch_triangle_boxes(model, x, self._skin, self._near, *of_tri)

@@ -145,6 +145,6 @@ def move_surfaces(
 
     def close_edges() -> None:
         surface.leftover(model, state.x, work)
-        surface.close(model, state.x, state.v, work, search)
+        wp.capture_if(work.found[0:1], lambda: surface.close(model, state.x, state.v, work, search))
 
     wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else close)

@@ -155,8 +155,9 @@ class Candidates:
 
     Attributes:
         x: positions of the candidates [m], shape (n_vert,)
-        skin: how far from them they hold [m], shape (1,)
-        motion: largest motion in a step [m], shape (1,)
+        skin: how far from them they hold [m], shape (n_body,)
+        motion: largest motion of each body in the step they were found for [m], shape (n_body,)
+        fastest: largest of these [m], shape (1,)
         stale: whether they have to be found again, shape (1,)
         edge: shortest mean edge of a body [m]
         verts: vertices and bodies with tets; a plane is a body with one tet
@@ -172,6 +173,7 @@ class Candidates:
     x: wp.array
     skin: wp.array
     motion: wp.array
+    fastest: wp.array
     stale: wp.array
     edge: float
     verts: Pairs

@@ -166,7 +166,7 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
 def launch_body_boxes(
     model: Model, x: wp.array, skin: wp.array, lower: wp.array, upper: wp.array
 ) -> None:
-    """Set the boxes of the bodies, grown by the skin [m], shape (1,)."""
+    """Set the boxes of the bodies, grown by their skins [m], shape (n_body,)."""
     wp.launch(bounds.clear_boxes, dim=model.n_body, inputs=[], outputs=[lower, upper])
     wp.launch(
         bounds.body_boxes,
@@ -184,7 +184,7 @@ def launch_triangle_boxes(
     lower: wp.array,
     upper: wp.array,
 ) -> None:
-    """Set the boxes of the triangles of bodies near another, grown by the skin [m], shape (1,)."""
+    """Set the boxes of the triangles of bodies near another, grown by the skins [m]."""
     wp.launch(
         bounds.triangle_boxes,
         dim=model.n_tri,
@@ -211,8 +211,9 @@ def _allocate_near(
 def _allocate_candidates(model: Model, capacity: Capacity) -> Candidates:
     return Candidates(
         x=_vectors(model.n_vert),
-        skin=_floats(1),
-        motion=_floats(1),
+        skin=_floats(model.n_body),
+        motion=_floats(model.n_body),
+        fastest=_floats(1),
         stale=wp.full(1, 1, dtype=int),
         edge=float(model.body_edge.numpy().min()),
         verts=_allocate_pairs(model.n_vert, capacity.verts, capacity.tets),

@@ -22,6 +22,7 @@ YOUNG, DENSITY = 5e4, 1000.0  # of the lower block [Pa], [kg/m^3]
 OVERLAP = 0.01  # [m]
 DT = 1e-4  # [s]
 CALLS = 200  # of stage 4, at most
+ROOM = Capacity(contacts=4096, verts=8192, tets=65536, edges=8192, tris=65536, near=65536)
 CELLS = (4, 4), (3, 4)
 RATIOS = 1.0, 10.0
 MATERIALS = {
@@ -56,7 +57,7 @@ def place(
 ) -> Iterator[Row]:
     """Rows of one combination."""
     sim = wc.Simulation(build(model, poisson, cells, ratio), wc.ContactSurface(search))
-    work = allocate_work(sim.model, sim.state, Capacity(contacts=4096))
+    work = allocate_work(sim.model, sim.state, ROOM)
     balanced = search == "balanced"
     slices = [slice(len(b.x)) if b.index == 0 else slice(-len(b.x), None) for b in sim.scene.bodies]
     (lower, under), (upper, above) = (
@@ -124,7 +125,7 @@ def gap(xl: np.ndarray, under: np.ndarray, xu: np.ndarray, above: np.ndarray) ->
 def first_speed(scene: wc.Scene, search: str) -> float:
     """Largest speed [m/s] after one full step from rest; the rest shapes carry no force."""
     sim = wc.Simulation(scene, wc.ContactSurface(search))
-    work = allocate_work(sim.model, sim.state, Capacity(contacts=4096))
+    work = allocate_work(sim.model, sim.state, ROOM)
     work.dt.fill_(DT)
     work.bodies.rebuild()
     solver.step(sim.model, sim.state, work, sim.response, stages=0, search=True, unit=1.0)

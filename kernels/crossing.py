@@ -8,9 +8,10 @@ the impulses on the vertices lead. An edge pq enters N through the triangle t1 a
     face      otherwise: the middle of the inner piece of pq against its closest surface point
 
 The ridge is also left when it is more than twice as far from pq as the middle is from the surface:
-an edge that lies flush in a face would else be pushed out sideways through the other faces. And it
-is left for the face when it would have overlapped more at the start of the step already: the lines
-have passed each other.
+an edge that lies flush in a face would else be pushed out sideways through the other faces. In a
+sharp wedge the middle is closer by sin(half the dihedral angle) all the same. And it is left for
+the face when it would have overlapped more at the start of the step already: the lines have passed
+each other.
 
 With one end inside, the triangle closest to that end stands for t2, and only a ridge makes a
 contact: the vertex has one of its own, but where two rims cross it lies beside the overlap. It is
@@ -42,6 +43,7 @@ wp.set_module_options({"enable_backward": False})
 
 # Of both skins, less the way of both bodies. The impulses seldom use up the rest of it.
 SURE = wp.constant(0.125)
+SHARP = wp.constant(1.64)  # a ridge with a dihedral angle below 75 degrees is sharp
 FLAT = wp.constant(2.0e-4)  # of an edge: an edge this deep lies in the face, whatever its direction
 
 
@@ -69,6 +71,7 @@ class EdgeContact:
     vert: wp.vec3i  # of N
     w: wp.vec3  # their weights
     ridge: bool
+    half: float  # sine of half the dihedral angle of the ridge
 
 
 @wp.func
@@ -91,8 +94,11 @@ def on_ridge(
     if wp.min(su) < 0.0 or wp.max(su) > 1.0:
         return out
     out.n = wp.normalize(wp.cross(q - p, b - a))
-    if wp.dot(out.n, face_normal(t1, x) + face_normal(t2, x)) < 0.0:
+    n1 = face_normal(t1, x)
+    n2 = face_normal(t2, x)
+    if wp.dot(out.n, n1 + n2) < 0.0:
         out.n = -out.n
+    out.half = 0.5 * wp.length(n1 + n2)
     out.d = wp.dot(a + su[1] * (b - a) - p - su[0] * (q - p), out.n)
     out.t = su[0]
     out.vert = wp.vec3i(ends[0], ends[1], ends[1])
@@ -222,7 +228,7 @@ def edge_contact(
         middle = p + t * (q - p)
         hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, middle)
         contact = on_ridge(p, q, tris[enter.tri], tris[leave.tri], x)
-        if contact.found and contact.d <= 2.0 * hit.t:
+        if contact.found and wp.min(SHARP * contact.half, 1.0) * contact.d <= 2.0 * hit.t:
             if not fresh or start_gap(contact, i, j, x0) > -STALE * edge:
                 return contact
             face = on_face(middle, t, hit, tris, x)

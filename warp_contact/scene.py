@@ -49,6 +49,7 @@ class Scene:
         if self.friction < 0.0:
             raise ValueError(f"friction {friction} is negative")
         self.bodies: list[Body] = []
+        self._labels: set[str] = set()
         self.planes: list[tuple[np.ndarray, float]] = []
 
     def add_body(
@@ -79,7 +80,7 @@ class Scene:
             ValueError: naming the body, for input that cannot be simulated
         """
         label = f"body{len(self.bodies)}" if label is None else str(label)
-        if any(body.label == label for body in self.bodies):
+        if label in self._labels:
             raise ValueError(f"body '{label}': another body has this label")
         try:
             if not isinstance(mesh, TetMesh):
@@ -96,6 +97,7 @@ class Scene:
             raise ValueError(f"body '{label}': {error}") from None
         body = Body(len(self.bodies), label, mesh, material, x, v, mask, int(world))
         self.bodies.append(body)
+        self._labels.add(label)
         return body
 
     def add_plane(self, normal, offset: float = 0.0) -> None:

@@ -236,6 +236,8 @@ class Simulation:
         v = self.state.v.numpy()
         speed = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0)))
         speed += float(np.linalg.norm(self.model.gravity)) / self.fps
+        if not math.isfinite(omega):
+            raise SimulationError(f"frame {self.frame + 1}: {self._flattest()}: no step is stable")
         stable = omega / (2.0 * SAFETY)
         passing = speed / (REACH * self._thickness)
         clean = min(speed / (TRAVEL * self._edge), PATIENCE * stable)
@@ -292,6 +294,17 @@ class Simulation:
 
     def _label(self, body: Body | int) -> str:
         return self.model.labels[body.index if isinstance(body, Body) else int(body)]
+
+    def _flattest(self) -> str:
+        """Name the tet with the least height: volume over largest face."""
+        m, x = self.model, self.state.x.numpy().astype(np.float64)
+        a, b, c, d = np.moveaxis(x[m.tets.numpy()], 1, 0)
+        faces = ((b, c, d), (a, c, d), (a, b, d), (a, b, c))
+        area = [np.linalg.norm(np.cross(q - p, r - p), axis=1) for p, q, r in faces]
+        volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a))
+        k = int((volume / np.maximum(np.max(area, axis=0), 1e-30)).argmin())
+        body = int(m.vert_body.numpy()[m.tets.numpy()[k, 0]])
+        return f"body '{m.labels[body]}', tet {k - int(m.body_tet.numpy()[body])} is too flat"
 
     def _vertex_area(self) -> np.ndarray:
         """A third of the surface around each vertex [m^2], shape (n_vert,)."""

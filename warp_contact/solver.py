@@ -1,5 +1,7 @@
 """One time step, read from top to bottom."""
 
+from functools import partial
+
 import warp as wp
 
 from warp_contact import candidates, depth, detect, impulse, surface
@@ -27,6 +29,8 @@ def step(
     damping, ``search`` says whether there may be overlaps that no step created, ``unit`` [N s] is
     the resolution of the recorded contact impulses.
     """
+    c = work.contacts
+    exchange = partial(impulse.exchange, model, state.v, work)
     if isinstance(response, Penalty):
         candidates.refresh(model, state.x, state.x, work)
         vertex_contacts(
@@ -34,7 +38,7 @@ def step(
         )  # forces belong to the positions they act at
         edge_contacts(model, state.x, state.x, work, False)
         predict(model, state, work, stages)
-        impulse.push(model, state.v, work, response)
+        wp.capture_if(c.n, lambda: impulse.push(model, state.v, work, response))
         impulse.record(model, work, unit)
         drift(model, state, work, state.x)
     elif response.search == "literal":
@@ -43,16 +47,16 @@ def step(
         wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
         vertex_contacts(model, state.x, state.x, work, False)
         move_surfaces(model, state, work, response, search)
-        impulse.exchange(model, state.v, work)
+        wp.capture_if(c.n, exchange)
         impulse.record(model, work, unit)
     else:
         predict(model, state, work, stages)
         candidates.refresh(model, state.x, work.x, work)
         vertex_contacts(model, state.x, work.x, work, not search)
-        impulse.exchange(model, state.v, work)
+        wp.capture_if(c.n, exchange)
         drift(model, state, work, work.x)
         edge_contacts(model, state.x, work.x, work, not search)
-        wp.capture_if(work.n_crossing, lambda: impulse.exchange(model, state.v, work))
+        wp.capture_if(work.n_crossing, exchange)
         impulse.record(model, work, unit)
         drift(model, state, work, state.x)
         edge_contacts(model, state.x, state.x, work, not search)
@@ -102,16 +106,24 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
 
 def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Stages 1 and 2: contacts of vertices inside other bodies at the positions ``x``."""
-    detect.find_hits(model, x, work)
-    depth.hit_depths(model, x, work)
-    depth.vertex_contacts(model, x0, x, work, fresh)
-    depth.contacts_by_vertex(model, work)
-    impulse.begin(model, x0, work, work.none)
+    work.n_hit.zero_()
+    work.contacts.n.zero_()
+
+    def find() -> None:
+        detect.find_hits(model, x, work)
+        depth.hit_depths(model, x, work)
+        depth.vertex_contacts(model, x0, x, work, fresh)
+        depth.contacts_by_vertex(model, work)
+        impulse.begin(model, x0, work, work.none)
+
+    wp.capture_if(work.candidates.verts.n, find)
 
 
 def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
-    detect.find_crossings(model, x0, x, work, fresh)
+    work.n_crossing.zero_()
+    look = partial(detect.find_crossings, model, x0, x, work, fresh)
+    wp.capture_if(work.candidates.edges.n, look)
 
     def append() -> None:
         depth.edge_contacts(model, x0, x, work, fresh)

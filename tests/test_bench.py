@@ -1,0 +1,80 @@
+"""The timer of ``tools/bench.py``: it sees every launch, knows its stage, and changes nothing."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+
+import warp_contact as wc
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
+
+from benching.cases import copies, pile
+from benching.memory import held
+from benching.stages import MEMORY, OTHER, STAGES, StageTimer
+from benching.window import measure
+
+
+@pytest.fixture
+def touching(device) -> wc.Simulation:
+    """A block that lies on another one, which lies on a plane."""
+    scene = wc.Scene()
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    for x, z in ((0.0, 0.05), (0.04, 0.15)):
+        scene.add_body(wc.box(0.1, 1), wc.NeoHookean(2e4, 0.3, 1000.0, 1e-3), (x, 0.0, z))
+    sim = wc.Simulation(scene, device=str(device))
+    sim.step_frame()
+    return sim
+
+
+def test_every_launch_belongs_to_a_stage(touching):
+    timing = measure(touching, repeats=2, steps=3)
+    assert timing.contacts > 0
+    assert {stage for stage, _ in timing.kernels} == set(STAGES)
+    assert sum(timing.launches.values()) == pytest.approx(
+        sum(launches for launches, _ in timing.kernels.values())
+    )
+    assert sum(timing.shares.values()) == pytest.approx(1.0)
+    assert timing.step_ms > 0.0
+    assert timing.elastic_ms > 0.0
+
+
+def test_a_launch_outside_of_a_step_is_seen_as_such(device):
+    a, b = (wp.zeros(5, dtype=float, device=device) for _ in range(2))
+    with StageTimer(device) as timer:
+        a.fill_(2.0)
+        wp.copy(b, a)
+    assert timer.operations == [(OTHER, "fill_"), (OTHER, "copy")]
+    assert len(timer.ms) == 2
+    np.testing.assert_array_equal(b.numpy(), 2.0)
+
+
+def test_measuring_leaves_simulation_and_warp_as_they_were(touching):
+    kept = [getattr(owner, name) for owner, name in MEMORY] + [wp.launch]
+    kept += [getattr(owner, name) for functions in STAGES.values() for owner, name in functions]
+    x, v = touching.positions(), touching.velocities()
+    measure(touching, repeats=1, steps=2)
+    np.testing.assert_array_equal(touching.positions(), x)
+    np.testing.assert_array_equal(touching.velocities(), v)
+    after = [getattr(owner, name) for owner, name in MEMORY] + [wp.launch]
+    after += [getattr(owner, name) for functions in STAGES.values() for owner, name in functions]
+    assert after == kept
+
+
+def test_bytes_of_shared_memory_count_once(device):
+    whole = wp.zeros(100, dtype=wp.vec3, device=device)
+    assert held((whole, whole[10:20])) == 1200
+    assert held((whole[:10], whole[5:20])) == 240
+
+
+def test_the_spheres_of_a_pile_just_touch():
+    below, above = pile(300).bodies[:2]
+    assert above.x[:, 2].min() == pytest.approx(below.x[:, 2].max())
+
+
+def test_copies_do_not_share_a_world():
+    scene = copies(3)
+    assert [body.world for body in scene.bodies] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+    np.testing.assert_allclose(scene.bodies[1].x, scene.bodies[7].x)

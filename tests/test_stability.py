@@ -1,0 +1,205 @@
+"""tools/stability.py: cells within the frontier, and that every kind of failure is seen as one."""
+
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
+
+from stable import chart, degenerate, limits, outcome, primitives, speed, sweeps
+from stable.outcome import Record, classify, level
+from stable.setup import METHODS, attempt, response
+from stable.watch import Setting, Watch
+
+import warp_contact as wc
+
+CELLS = {
+    "step 3e-4 s, E 1e5": ("step", 3e-4, 1e5),
+    "step 1e-3 s, E 1e4": ("step", 1e-3, 1e4),
+    "mass 1e2, stiffness 1e2": ("ratio", 1e2, 1e2),
+    "mass 1e4, stiffness 1e-2": ("ratio", 1e4, 1e-2),
+    "overlap 0.03, thickness 0.07": ("depth", 0.03, 0.07),
+    "overlap 0.3, thickness 0.4": ("depth", 0.3, 0.4),
+    "0.5 m/s, step 3e-4 s": ("speed", 0.5, 3e-4),
+}
+CASES = {
+    "edge on edge at 30 degrees": partial(limits.edges, 30.0),
+    "beam across beam": partial(limits.beams, 90.0),
+    "corner on a seam": partial(limits.seam, 0.0),
+    "cube on one large facet": partial(limits.facet, False),
+    "20 plates a frame": partial(speed.through, 20.0, None),
+    "ball of 67 m/s": partial(speed.golf, 41, 67.0),
+    "tet in a slot": partial(primitives.slot, 5e-7),
+    "faces at distance zero": degenerate.pair,
+}
+
+
+def two_blocks(**placed) -> Watch:
+    """A watched run of two blocks above each other, before its first step."""
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+    for z in (0.0, 1.1):
+        scene.add_body(wc.box(1.0, 2), wc.NeoHookean(1e5, 0.3, 1000.0), (0.0, 0.0, z))
+    setting = Setting(scene, 0.1, **placed)
+    return Watch(wc.Simulation(scene, fps=200), setting)
+
+
+def seen(watch: Watch, x: np.ndarray) -> str:
+    """The outcome after a look at the positions."""
+    watch.sim.state.x.assign(x.astype(np.float32))
+    return classify(watch.look())
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_a_cell_within_the_frontier_is_fine(name):
+    sweep, x, y = CELLS[name]
+    r = attempt(partial(sweeps.SWEEPS[sweep].build, x, y), most_steps=1500)
+    assert classify(r) == outcome.FINE, r
+    assert r.touched
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_case_that_works_goes_on_working(name):
+    r = attempt(CASES[name])
+    assert level(r) in (outcome.GOOD, outcome.EXCELLENT), r
+
+
+@pytest.mark.parametrize("case", list(degenerate.refusals()), ids=lambda case: case.name)
+def test_input_without_a_meaning_is_refused_by_name(case):
+    assert level(attempt(case.build), case.expect) == outcome.EXCELLENT
+
+
+def test_a_state_at_rest_is_fine():
+    watch = two_blocks()
+    assert seen(watch, watch.sim.positions()) == outcome.FINE
+
+
+def test_a_body_on_the_other_side_is_lost():
+    watch = two_blocks()
+    x = watch.sim.positions()
+    x[27:, 2] -= 2.2
+    assert seen(watch, x) == outcome.LOST
+    assert watch.record.lost == "body1 went through body0"
+
+
+def test_a_body_that_fell_past_another_is_not_lost():
+    watch = two_blocks()
+    x = watch.sim.positions()
+    x[27:] += [1.2, 0.0, -2.2]
+    assert seen(watch, x) == outcome.FINE
+
+
+def test_a_body_behind_a_plane_is_lost():
+    scene = wc.Scene()
+    scene.add_plane((0.0, 0.0, 1.0))
+    scene.add_body(wc.box(1.0, 1), wc.NeoHookean(1e5, 0.3, 1000.0), (0.0, 0.0, 0.6))
+    watch = Watch(wc.Simulation(scene, fps=200), Setting(scene, 0.1))
+    assert seen(watch, watch.sim.positions() - [0.0, 0.0, 0.8]) == outcome.LOST
+
+
+def test_a_body_turned_inside_out_is_inverted():
+    watch = two_blocks()
+    x = watch.sim.positions()
+    x[0] *= -0.6
+    assert seen(watch, x) == outcome.INVERTED
+    assert watch.record.volume < 0.0
+
+
+def test_an_inversion_on_the_way_costs_a_level_only():
+    watch = two_blocks()
+    rest, x = watch.sim.positions(), watch.sim.positions()
+    x[0] *= -0.6
+    seen(watch, x)
+    watch.record.gained = 0.0  # the energy that the state above was given
+    assert seen(watch, rest) == outcome.FINE
+    assert level(watch.record) == outcome.GOOD
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_state_that_is_no_number_is_not_finite(value):
+    watch = two_blocks()
+    x = watch.sim.positions()
+    x[3, 1] = value
+    assert seen(watch, x) == outcome.INFINITE
+
+
+def test_bodies_in_each_other_overlap():
+    watch = two_blocks()
+    x = watch.sim.positions()
+    x[27:] += [0.1, 0.1, -0.3]
+    assert seen(watch, x) == outcome.OVERLAP
+    np.testing.assert_allclose(watch.record.overlap, 0.2, rtol=1e-5)
+
+
+def test_velocity_from_nothing_is_a_rise_of_the_energy():
+    watch = two_blocks()
+    watch.sim.set_velocity(0, (0.0, 0.0, -1.0))
+    assert classify(watch.look()) == outcome.ENERGY
+
+
+def test_a_pop_out_of_a_deep_start_is_a_rise_of_the_energy():
+    watch = two_blocks(recovers=True)
+    watch.sim.set_velocity(1, (0.0, 0.0, 1.0))
+    assert classify(watch.look()) == outcome.ENERGY
+
+
+@pytest.mark.parametrize("figure", ["overlap", "gained", "volume"])
+def test_a_figure_that_is_no_number_is_never_fine(figure):
+    assert classify(Record(**{figure: np.nan})) != outcome.FINE
+
+
+def test_a_step_that_is_too_long_fails():
+    r = attempt(partial(sweeps.SWEEPS["step"].build, 1e-2, 1e6))
+    assert classify(r) in (outcome.INFINITE, outcome.INVERTED, outcome.ENERGY)
+
+
+def test_a_step_longer_than_both_bodies_goes_through():
+    r = attempt(partial(speed.through, 20.0, 1))
+    assert classify(r) == outcome.LOST
+
+
+def test_a_run_beyond_its_time_is_stopped():
+    r = attempt(partial(limits.deep, 0.6), limit=1e-3)
+    assert classify(r) == outcome.STOPPED
+    assert "not done" in r.reason
+
+
+def test_the_methods_are_what_they_are_called():
+    scene = limits.edges(90.0).scene
+    found = [response(method, scene) for method in METHODS]
+    assert found[0] == wc.ContactSurface()
+    assert found[1].search == "literal"
+    ratios = [penalty.stiffness / found[2].stiffness for penalty in found[2:]]
+    np.testing.assert_allclose(ratios, [1.0, 10.0, 100.0, 1e3, 1e4])
+
+
+def test_the_frontier_runs_between_fine_and_other_cells():
+    sides = chart.frontier([["fine", "lost"], ["fine", "fine"]])
+    assert sides == [((0.5, 0.5), (-0.5, 0.5)), ((0.5, 1.5), (0.5, 0.5))]
+
+
+def test_the_map_writes_a_row_per_cell_and_a_picture(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(chart, "METHODS", METHODS[:2])
+    monkeypatch.setattr(sweeps, "COARSE", 2)
+    monkeypatch.setitem(chart.SWEEPS, "small", sweeps.SWEEPS["speed"])
+    assert chart.draw(["small"], True, tmp_path) == 0
+    rows = (tmp_path / "map.csv").read_text().splitlines()
+    assert len(rows) == 1 + 2 * 4
+    assert (tmp_path / "small.png").stat().st_size > 1000
+
+
+def test_without_matplotlib_the_map_says_so(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert chart.draw(["speed"], True, tmp_path / "map") == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_every_mass_and_stiffness_ratio_of_the_quick_map_is_fine():
+    s = sweeps.SWEEPS["ratio"]
+    xs, ys = s.axes(quick=True)
+    found = {(x, y): attempt(partial(s.build, x, y), most_steps=600) for x in xs for y in ys}
+    assert {cell: r for cell, r in found.items() if classify(r) != outcome.FINE} == {}

@@ -1,0 +1,83 @@
+"""What is compared: methods with their knobs, as many settings for each as the budget allows."""
+
+from dataclasses import dataclass
+
+import warp_contact as wc
+from charting.panel import Panel
+
+STIFFNESSES = 0.01, 0.1, 1.0, 10.0, 100.0  # of that of the panel
+
+
+@dataclass(frozen=True)
+class Own:
+    """A response of this package at one setting.
+
+    ``factor``: substeps over those that the simulation takes by itself; 1 leaves it to it.
+    ``times``: stiffness of a penalty over that of the panel.
+    """
+
+    method: str
+    search: str = ""
+    iterations: int = 4
+    factor: int = 1
+    times: float = 0.0
+
+    def __str__(self):
+        """The knobs."""
+        if self.times:
+            return f"stiffness x{self.times:g}, steps x{self.factor}"
+        return f"iterations {self.iterations}, steps x{self.factor}"
+
+    def response(self, panel: Panel):
+        """For a panel; the damping of a penalty keeps its ratio."""
+        if self.times:
+            return wc.Penalty(self.times * panel.stiffness, self.times**0.5 * panel.damping)
+        return wc.ContactSurface(self.search, self.iterations)
+
+
+def own(quick: bool) -> list[Own]:
+    """Settings of ``ContactSurface()``, of its literal search, and of penalties."""
+    out = [Own("default", "balanced", 4, f) for f in (1, 2, 4)]
+    out += [Own("default", "balanced", n) for n in (2, 8)]
+    out += [Own("literal", "literal", n) for n in (4, 8, 16)]
+    out += [Own("penalty", times=k) for k in STIFFNESSES]
+    if quick:
+        return out
+    out += [Own("default", "balanced", n, f) for n in (2, 8, 16) for f in (2, 4)]
+    out += [Own("literal", "literal", n, f) for n in (4, 8, 16) for f in (2, 4)]
+    return out + [Own("penalty", times=k, factor=2) for k in STIFFNESSES]
+
+
+# Knobs of the engines outside: file in tools/peers, then settings as the file reads them.
+PEERS = {
+    "Newton VBD": "newton_vbd.py",
+    "Newton XPBD": "newton_xpbd.py",
+    "MuJoCo flex": "mujoco_flex.py",
+}
+
+
+# The knobs of each engine, then its settings: those of the quick run, and further ones.
+SWEEPS = {
+    "Newton VBD": (
+        ("steps", "iterations", "contact", "margin"),
+        ((2, 5, 1, 0.1), (5, 5, 1, 0.1), (10, 10, 1, 0.1), (5, 5, 10, 0.02), (10, 10, 10, 0.02)),
+        ((20, 20, 1, 0.1), (20, 20, 10, 0.02), (40, 20, 10, 0.02), (5, 5, 1, 0.02))
+        + ((20, 20, 100, 0.02),),
+    ),
+    "Newton XPBD": (
+        ("steps", "iterations", "relaxation"),
+        ((5, 2, 0.2), (10, 2, 0.2), (10, 10, 0.2), (32, 2, 0.2), (10, 10, 0.4)),
+        ((32, 10, 0.2), (32, 10, 0.4), (64, 10, 0.2), (128, 4, 0.2), (10, 20, 0.1)),
+    ),
+    "MuJoCo flex": (
+        ("steps", "iterations", "time_constant"),
+        ((1, 20, 2), (2, 20, 2), (4, 20, 2), (2, 20, 5), (4, 100, 5)),
+        ((8, 20, 2), (16, 20, 2), (8, 100, 5), (16, 100, 10), (4, 5, 2)),
+    ),
+}
+
+
+def outside(method: str, quick: bool) -> list[dict]:
+    """Settings of an engine outside: five in the quick run, ten in all."""
+    knobs, first, more = SWEEPS[method]
+    return [dict(zip(knobs, values, strict=True)) for values in (first if quick else first + more)]

@@ -1,0 +1,51 @@
+"""Run a panel with a response of this package."""
+
+from time import perf_counter
+
+import numpy as np
+
+import warp_contact as wc
+from charting.panel import Failed, Motion, Panel, placed
+
+
+def run(panel: Panel, response, substeps: int | None, limit: float) -> Motion:
+    """Every frame; the first one, which compiles and captures, is not timed.
+
+    Args:
+        panel: what to run
+        response: of this package
+        substeps: in each frame; None leaves the number to the simulation
+        limit: wall seconds after which the run is given up
+    """
+    begin = perf_counter()
+    scene = panel.scene()
+    sim = wc.Simulation(scene, response, fps=panel.fps, substeps=substeps)
+    sim.state.x.assign(placed(panel, scene).astype(np.float32))
+    x, v = [sim.positions()], [sim.velocities()]
+    startup, wall = 0.0, 0.0
+    for frame in range(1, panel.frames + 1):
+        if frame - 1 == panel.stop:
+            _halt(sim)
+        start = perf_counter()
+        try:
+            sim.step_frame()
+        except wc.SimulationError as error:
+            raise Failed(str(error)) from None
+        if frame == 1:
+            startup = perf_counter() - begin
+        else:
+            wall += perf_counter() - start
+        x.append(sim.positions())
+        v.append(sim.velocities())
+        if wall > limit and frame < panel.frames:
+            reason = f"too slow: {frame} of {panel.frames} frames in {limit:.3g} s"
+            raise Failed(reason, wall * panel.fps / (frame - 1))
+    seconds = (panel.frames - 1) / panel.fps
+    law = "neo-hookean"
+    return Motion(np.array(x), np.array(v), law, wall / seconds, startup, sim.substeps)
+
+
+def _halt(sim: wc.Simulation) -> None:
+    for body in sim.scene.bodies:
+        if body.fixed.any():
+            sim.set_velocity(body, 0.0, body.fixed)

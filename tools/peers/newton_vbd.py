@@ -1,0 +1,31 @@
+"""Newton's vertex block descent: implicit Euler, contact at a margin, a penalty inside it.
+
+Knobs: ``steps`` in a frame, ``iterations``, ``contact`` stiffness over E edge, and the ``margin``
+over an edge at which contact begins. Its contact knows triangles and edges, and takes all bodies
+as one mesh. Its damping is a stress of its own, see ``newton_common``.
+"""
+
+import newton
+from job import main, mean_edge
+from newton_common import Engine, build, stiffness
+
+
+def make(scene, job: dict, setting: dict) -> Engine:
+    """The engine for one setting."""
+    edge = mean_edge(scene)
+    model = build(scene, stiffness(scene, setting["contact"]), radius=1e-3 * edge)
+    model.soft_contact_mu = model.particle_mu = job["friction"]
+    margin = setting["margin"] * edge
+    solver = newton.solvers.SolverVBD(
+        model,
+        iterations=setting["iterations"],
+        particle_enable_self_contact=len(scene.young) > 1,
+        particle_self_contact_margin=margin,
+        particle_self_contact_gap=margin,
+        particle_enable_tile_solve=False,
+    )
+    return Engine(scene, job, setting, model, solver)
+
+
+if __name__ == "__main__":
+    main(make)

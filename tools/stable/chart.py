@@ -1,0 +1,110 @@
+"""The map: a table with a row per cell, a heat map per sweep with the frontier of what is fine."""
+
+import csv
+import sys
+from functools import partial
+from pathlib import Path
+
+from stable.outcome import FINE, OUTCOMES, Record, classify
+from stable.setup import METHODS, attempt
+from stable.sweeps import MOST_STEPS, SWEEPS
+
+COLUMNS = (
+    *("sweep", "method", "x_name", "x", "y_name", "y", "outcome", "overlap", "energy_gained"),
+    *("lowest_volume", "end_volume", "touched", "steps", "time", "asked", "reason"),
+)
+COLOURS = "#dcefdc", "#f6d55c", "#ed8b3b", "#c0392b", "#5b2c6f", "#8d99a6", "#1b1b1b", "#ffffff"
+LIMIT = 30.0  # seconds that a cell may take
+
+
+def draw(names: list[str], quick: bool, out: Path) -> int:
+    """Run the sweeps, write the table as they go and a picture after each."""
+    plots = pyplot()
+    if plots is None:
+        print("no matplotlib: pip install 'warp_contact[plot]'", file=sys.stderr)
+        return 1
+    out.mkdir(parents=True, exist_ok=True)
+    with open(out / "map.csv", "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(COLUMNS)
+        for name in names:
+            found = {method: sweep(name, method, quick, table, file) for method in METHODS}
+            picture(plots, name, quick, found, out / f"{name}.png")
+    return 0
+
+
+def pyplot():
+    """Matplotlib without a window, or None."""
+    try:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        from matplotlib import pyplot
+
+        return pyplot
+    except ImportError:
+        return None
+
+
+def sweep(name: str, method: str, quick: bool, table, file) -> list[list[str]]:
+    """The outcomes of all cells of a method, by rows of equal y."""
+    s = SWEEPS[name]
+    xs, ys = s.axes(quick)
+    grid = []
+    for y in ys.tolist():
+        grid.append([])
+        for x in xs.tolist():
+            r = attempt(
+                partial(s.build, x, y), method, most_steps=MOST_STEPS[not quick], limit=LIMIT
+            )
+            grid[-1].append(classify(r))
+            table.writerow((name, method, s.x_name, x, s.y_name, y, *row(r)))
+            file.flush()
+    outcomes = [o for line in grid for o in line]
+    counts = ", ".join(f"{o} {outcomes.count(o)}" for o in OUTCOMES if o in outcomes)
+    print(f"{name:8}  {method:14}  {counts}", flush=True)
+    return grid
+
+
+def row(r: Record) -> tuple:
+    """The figures of a cell."""
+    figures = r.overlap, r.gained, r.lowest, r.volume, r.touched, r.steps, r.time, r.asked
+    return classify(r), *figures, r.reason
+
+
+def picture(plots, name: str, quick: bool, found: dict, path: Path) -> None:
+    """A panel per method: colours of the outcomes, a line around what is fine."""
+    s = SWEEPS[name]
+    xs, ys = s.axes(quick)
+    figure, axes = plots.subplots(2, 4, figsize=(16, 8), layout="constrained")
+    figure.suptitle(s.title)
+    for axis, (method, grid) in zip(axes.flat, found.items(), strict=False):
+        codes = [[OUTCOMES.index(o) for o in line] for line in grid]
+        colours = plots.matplotlib.colors.ListedColormap(COLOURS)
+        axis.imshow(codes, origin="lower", cmap=colours, vmin=-0.5, vmax=len(OUTCOMES) - 0.5)
+        for ends in frontier(grid):
+            axis.plot(*ends, color="black", linewidth=2.0)
+        axis.set_title(method)
+        axis.set_xticks(range(len(xs)), [f"{x:.2g}" for x in xs], rotation=90)
+        axis.set_yticks(range(len(ys)), [f"{y:.2g}" for y in ys])
+        axis.set_xlabel(s.x_name)
+        axis.set_ylabel(s.y_name)
+    legend = axes.flat[-1]
+    legend.axis("off")
+    for outcome, colour in zip(OUTCOMES, COLOURS, strict=True):
+        legend.scatter([], [], s=120, marker="s", color=colour, edgecolor="grey", label=outcome)
+    legend.legend(loc="center", fontsize=12)
+    figure.savefig(path, dpi=100)
+    plots.close(figure)
+
+
+def frontier(grid: list[list[str]]) -> list[tuple[tuple, tuple]]:
+    """The sides between a cell that is fine and one that is not: (x, x), (y, y) of their ends."""
+    sides = []
+    for j, line in enumerate(grid):
+        for i, outcome in enumerate(line):
+            if i + 1 < len(line) and (outcome == FINE) != (line[i + 1] == FINE):
+                sides.append(((i + 0.5, i + 0.5), (j - 0.5, j + 0.5)))
+            if j + 1 < len(grid) and (outcome == FINE) != (grid[j + 1][i] == FINE):
+                sides.append(((i - 0.5, i + 0.5), (j + 0.5, j + 0.5)))
+    return sides

@@ -64,6 +64,21 @@ def test_hashing_finds_what_brute_force_finds(rng, stages, jittered, turned, wor
     assert not work.contacts.needed.numpy().any()
 
 
+def test_a_body_near_very_many_others_misses_none(rng, stages, jittered, turned):
+    scene = Scene()
+    scene.add_body(box((3.0, 3.0, 0.2), (6, 6, 1)), RUBBER)
+    for k in range(49):
+        place = (0.4 * (k % 7) - 1.2, 0.4 * (k // 7) - 1.2, rng.uniform(0.1, 0.3))
+        scene.add_body(jittered(0.2, 1), RUBBER, place, turned())
+    model, state, work = stages(scene)
+    pairs = set(found(model, state, work))
+    assert work.near.n_near.numpy()[0] > work.near.near.shape[1]
+    sure, doubtful = brute_force(scene, state.x.numpy().astype(float))
+    assert sure and sure <= pairs <= sure | doubtful
+    solver.edge_contacts(model, state.x, state.x, work, fresh=False)
+    assert work.n_crossing.numpy()[0] > 0
+
+
 def test_several_bodies_at_one_vertex_are_all_found(stages, turned):
     scene = Scene()
     for k in range(5):

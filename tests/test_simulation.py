@@ -10,6 +10,7 @@ from warp_contact import (
     Scene,
     Simulation,
     SimulationError,
+    TetMesh,
     box,
     sphere,
 )
@@ -124,6 +125,16 @@ def test_a_block_at_rest_presses_with_its_weight():
     # The mean over half a second of what is left of the motion.
     assert np.mean(forces) == pytest.approx(1000.0 * 0.1**3 * G, rel=1e-3)
     assert sim.measure().overlap < 1e-3 * 0.05
+
+
+def test_a_tet_too_flat_for_any_step_is_named():
+    f = 1e-6
+    x = 0.1 * np.array([[0.577, 0, -f], [-0.289, 0.5, -f], [-0.289, -0.5, -f], [0.0, 0.0, 0.0]])
+    scene = Scene()
+    scene.add_body(box(0.1, 1), DRY, (1.0, 0.0, 0.0))
+    scene.add_body(TetMesh(x, [[0, 1, 2, 3]]), DRY, label="sliver")
+    with pytest.raises(SimulationError, match="frame 1: body 'sliver', tet 0 is too flat"):
+        Simulation(scene).step_frame()
 
 
 def test_a_nan_stops_the_run_and_names_frame_and_body():

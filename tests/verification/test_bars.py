@@ -26,11 +26,11 @@ def test_a_bar_rebounds_from_a_wall(ask, hold):
 def test_bars_press_on_each_other_with_the_pressure_of_the_waves(name, ask, hold):
     figures = list(bars.hit(name, bars.IMPACTS[name], ask, bars.ELEMENTS))
     hold([f for f in figures if f.name.startswith("pressure, mean")], "good")
-    # target 1 %, reached 3 % to ten times the whole, as rounding decides: an edge across the flush
-    # end of another bar is now and then taken for a crossing half an edge deep and sideways. The
-    # closure moves it by 0.02 of an edge at once, many times the energy of an impact this slow.
+    # target 0.01, reached 0.002 to 0.29: where the sides of both bars lie flush, corners that slip
+    # beside each other are in contact in some steps only. The way that they come closer in the
+    # others is closed against the pressure, in an impact as slow as this a part of its energy.
     rise = next(f for f in figures if f.name.startswith("rise"))
-    assert rise.value < 20.0
+    assert rise.value < 0.6
 
 
 @pytest.mark.parametrize("name", ["identical", "L2 = 2 L1"])

@@ -29,12 +29,7 @@ def test_columns_share_their_overlap_like_springs(name, across, mesh, turned, as
 def test_the_pressure_does_not_depend_on_the_damping_of_the_material(ask, hold):
     case = springs.CASES["equal"]
     figures = list(springs.press("equal", case, ask, 6, "structured", Pose(), springs.DAMPED))
-    places = [f for f in figures if "height" in f.name or "overlap" in f.name]
-    hold(places, "good")
-    force = next(f for f in figures if "force" in f.name)
-    # target 0.031, reached 0.17 because the damping acts between the elastic forces and the
-    # impulses of a step: it passes a part of the forces on contact on to the layer below.
-    assert abs(force.error) < 0.25
+    hold(figures, "excellent")
 
 
 @pytest.mark.parametrize("cells", stack.CELLS)
@@ -50,5 +45,6 @@ def test_a_penalty_of_a_hundred_times_the_columns_takes_one_per_cent_of_the_forc
     found = springs.press("equal", case, Ask(response="penalty"), 4, "structured", Pose())
     force = next(f for f in found if "force" in f.name)
     print(force)
-    # It takes effect for the contacts that are found: fewer at flush rims, so softer by up to two.
-    assert -0.02 < force.error < -0.005
+    # It takes effect for the contacts that are found: fewer at flush rims, more where edges cross
+    # there, so softer or stiffer by up to about two.
+    assert -0.025 < force.error < -0.003

@@ -12,7 +12,7 @@ from importlib import import_module
 import warp as wp
 from checks import table
 
-CASES = "collision", "weight", "surface", "scenes", "energy"
+CASES = "collision", "weight", "surface", "scenes", "energy", "bowl"
 
 
 def main() -> int:

@@ -51,29 +51,38 @@ def moved(
 
 
 @wp.kernel
-def largest_motions(
+def track(
     # in
     vert_body: wp.array[int],  # (n_vert,)
-    x0: wp.array[wp.vec3],  # (n_vert,) [m]
-    x1: wp.array[wp.vec3],  # (n_vert,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # in, out
+    last: wp.array[wp.vec3],  # (n_vert,) [m] positions of the last look
     # out, added to
-    motion: wp.array[float],  # (n_body,) [m] of each body in the step
-    fastest: wp.array[float],  # (1,) [m] of them all
+    motion: wp.array[float],  # (n_body,) [m] largest motion since then
 ):
     """One thread per CHUNK of vertices."""
     first = wp.tid() * CHUNK
     body = vert_body[first]
     largest = float(0.0)
-    most = float(0.0)
-    for i in range(first, wp.min(first + CHUNK, x0.shape[0])):
+    for i in range(first, wp.min(first + CHUNK, x.shape[0])):
         if vert_body[i] != body:
             wp.atomic_max(motion, body, largest)
             body = vert_body[i]
             largest = 0.0
-        largest = wp.max(largest, wp.length(x1[i] - x0[i]))
-        most = wp.max(most, largest)
+        largest = wp.max(largest, wp.length(x[i] - last[i]))
+        last[i] = x[i]
     wp.atomic_max(motion, body, largest)
-    wp.atomic_max(fastest, 0, most)
+
+
+@wp.kernel
+def find_fastest(
+    # in
+    motion: wp.array[float],  # (n_body,) [m]
+    # out, added to
+    fastest: wp.array[float],  # (1,) [m]
+):
+    """One thread per body."""
+    wp.atomic_max(fastest, 0, motion[wp.tid()])
 
 
 @wp.func
@@ -116,30 +125,6 @@ def choose_skins(
             push = wp.max(push, motion[near[m, k]])
     skin[m] = own_skin(motion[m], edge) + push
     stale[0] = 0
-
-
-@wp.kernel
-def track(
-    # in
-    vert_body: wp.array[int],  # (n_vert,)
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # in, out
-    last: wp.array[wp.vec3],  # (n_vert,) [m] positions of the last look
-    # out, added to
-    motion: wp.array[float],  # (n_body,) [m] largest motion since then
-):
-    """One thread per CHUNK of vertices."""
-    first = wp.tid() * CHUNK
-    body = vert_body[first]
-    largest = float(0.0)
-    for i in range(first, wp.min(first + CHUNK, x.shape[0])):
-        if vert_body[i] != body:
-            wp.atomic_max(motion, body, largest)
-            body = vert_body[i]
-            largest = 0.0
-        largest = wp.max(largest, wp.length(x[i] - last[i]))
-        last[i] = x[i]
-    wp.atomic_max(motion, body, largest)
 
 
 @wp.kernel

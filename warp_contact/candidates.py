@@ -35,28 +35,25 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
 def track(model: Model, x: wp.array, work: Work) -> None:
     """Let the bodies go on to ``x``, where candidates are looked at."""
     c = work.candidates
+    _move(model, x, work)
+    wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=[c.motion, c.way])
+
+
+def _move(model: Model, x: wp.array, work: Work) -> None:
+    """Add to ``motion`` what is new at ``x``."""
+    c = work.candidates
     chunks = -(-model.n_vert // int(candidates.CHUNK))
-    wp.launch(
-        candidates.track,
-        dim=chunks,
-        inputs=[model.vert_body, x],
-        outputs=[c.last, c.body_motion],
-    )
-    wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=[c.body_motion, c.way])
+    inputs = [model.vert_body, x]
+    wp.launch(candidates.track, dim=chunks, inputs=inputs, outputs=[c.last, c.motion])
 
 
 def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
     """Set ``skin`` for a step to ``x1``, ``near`` and the boxes of the bodies."""
     c = work.candidates
-    chunks = -(-model.n_vert // int(candidates.CHUNK))
     c.motion.zero_()
     c.fastest.zero_()
-    wp.launch(
-        candidates.largest_motions,
-        dim=chunks,
-        inputs=[model.vert_body, c.x, x1],
-        outputs=[c.motion, c.fastest],
-    )
+    _move(model, x1, work)
+    wp.launch(candidates.find_fastest, dim=model.n_body, inputs=[c.motion], outputs=[c.fastest])
     moving = [c.edge, c.fastest, c.motion]
     wp.launch(candidates.widest_skins, dim=model.n_body, inputs=moving, outputs=[c.skin])
     _find_near(model, work)

@@ -156,15 +156,14 @@ class Candidates:
     Attributes:
         x: positions of the candidates [m], shape (n_vert,)
         skin: how far from them they hold [m], shape (n_body,)
-        motion: largest motion of each body in the step they were found for [m], shape (n_body,)
-        fastest: largest of these [m], shape (1,)
+        motion: largest motion of each body since the last look [m], shape (n_body,)
+        fastest: largest of these when they were found [m], shape (1,)
         stale: whether they have to be found again, shape (1,)
         edge: shortest mean edge of a body [m]
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
         last: positions of the last look [m], shape (n_vert,)
-        body_motion: largest motion of each body since then [m], shape (n_body,)
-        way: sum of these since the candidates were found [m], shape (n_body + n_plane,)
+        way: sum of the motions since the candidates were found [m], shape (n_body + n_plane,)
         n_found: length of the list that is being filled, shape (1,)
         vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
         near_tri: triangles in the slabs of near bodies, shape (capacity.near,)
@@ -179,7 +178,6 @@ class Candidates:
     verts: Pairs
     edges: Pairs
     last: wp.array
-    body_motion: wp.array
     way: wp.array
     n_found: wp.array
     vert_tet: wp.array

@@ -219,7 +219,6 @@ def _allocate_candidates(model: Model, capacity: Capacity) -> Candidates:
         verts=_allocate_pairs(model.n_vert, capacity.verts, capacity.tets),
         edges=_allocate_pairs(model.n_edge, capacity.edges, capacity.tris),
         last=_vectors(model.n_vert),
-        body_motion=_floats(model.n_body),
         way=_floats(model.n_body + model.n_plane),
         n_found=_ints(1),
         vert_tet=wp.zeros(capacity.tets, dtype=wp.vec2i),

@@ -11,7 +11,7 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-REST = wp.constant(1.0e-3)  # of an edge: the gap that is left between bodies at rest
+REST = wp.constant(2.0e-4)  # of an edge: the gap that is left between bodies at rest
 
 
 @wp.func

@@ -1,14 +1,19 @@
 """Stage 1, in every step: which candidates are hits, a vertex inside a body or below a plane.
 
+A vertex in the skin of a body, SKIN of an edge, is a hit too. Rims that lie flush in a wall would
+else be inside or outside by rounding, and a contact at rest would be lost and found in turns.
+
 Hits keep the order of their candidates: by vertex, then by body, planes last.
 """
 
 import warp as wp
 
 from warp_contact.kernels.candidates import CAREFUL
-from warp_contact.kernels.geometry import NONE, tet_weights
+from warp_contact.kernels.geometry import NONE, tet_weights, triangle_closest
 
 wp.set_module_options({"enable_backward": False})
+
+SKIN = wp.constant(1.0e-3)  # of an edge: a vertex this close is looked at like one inside
 
 
 @wp.func
@@ -27,6 +32,21 @@ def distance(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3) -> floa
     return 0.0
 
 
+@wp.func
+def distance_to(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3) -> float:
+    w = triangle_closest(x, a, b, c)
+    return wp.length(w[0] * (a - x) + w[1] * (b - x) + w[2] * (c - x))
+
+
+@wp.func
+def distance_to_faces(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3) -> float:
+    """Distance to the surface of a tet [m]."""
+    return wp.min(
+        wp.min(distance_to(x, a, b, c), distance_to(x, a, b, d)),
+        wp.min(distance_to(x, a, c, d), distance_to(x, b, c, d)),
+    )
+
+
 @wp.kernel
 def find_hits(
     # in
@@ -37,6 +57,7 @@ def find_hits(
     n_body: int,
     tets: wp.array[wp.vec4i],  # (n_tet,)
     vert_body: wp.array[int],  # (n_vert,)
+    body_edge: wp.array[float],  # (n_body,) [m]
     plane_n: wp.array[wp.vec3],  # (n_plane,)
     plane_h: wp.array[float],  # (n_plane,) [m]
     way: wp.array[float],  # (n_body + n_plane,) [m]
@@ -68,7 +89,14 @@ def find_hits(
         if wp.min(tet_weights(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0:
             hit[c] = 1
             return
-        clear = wp.min(clear, distance(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]]))
+        skin = SKIN * body_edge[body]
+        apart = distance(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]]) - skin
+        if apart < 0.0:
+            apart = distance_to_faces(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]]) - skin
+            if apart <= 0.0:
+                hit[c] = 1
+                return
+        clear = wp.min(clear, apart)
     wake[c] = spent + CAREFUL * clear
 
 

@@ -156,11 +156,12 @@ def solve_contacts(
             u += open[c] * wp.dot(n, w) * turn[c, k]
     un = wp.dot(u, n)
     excess = un + wp.max(closing[c], 0.0)
-    if excess * dt[0] < -tolerance * body_edge[pair[c][0]] and done[0] < sweeps:
-        again[0] = 1
     y = ahead[c]
     yt = wp.vec3(y[0], y[1], y[2])
     new_lam = wp.max(y[3] - excess / weight[c], 0.0)
+    off = wp.abs(new_lam - y[3]) * weight[c]
+    if off * dt[0] > tolerance * body_edge[pair[c][0]] and done[0] < sweeps:
+        again[0] = 1
     new_slip = wp.vec3(0.0, 0.0, 0.0)
     if mu > 0.0:
         new_slip = clamped(yt - (u - un * n) / weight[c], mu * new_lam)

@@ -7,7 +7,7 @@ ends outside by the distance of the middle of its inner piece to that surface.
 import warp as wp
 
 from warp_contact.kernels.geometry import tet_weights
-from warp_contact.kernels.surface_query import closest_hit, first_crossing
+from warp_contact.kernels.surface_query import closest_hit, first_crossing, inner_side
 
 wp.set_module_options({"enable_backward": False})
 
@@ -107,6 +107,6 @@ def edge_overlaps(
             if piece.enter.tri >= 0 and piece.leave.tri >= 0:
                 middle = p + 0.5 * (piece.enter.t + piece.leave.t) * (q - p)
                 hit = closest_hit(surface, body, tris, x, middle, 0.1 * body_edge[body])
-                if hit.t > overlap[e]:
+                if hit.t > overlap[e] and inner_side(hit, tris, x, middle) > 0.0:
                     overlap[e] = hit.t
                     partner[e] = body

@@ -47,7 +47,7 @@ def penalty_impulses(
     un = wp.dot(u, n)
     lam[c] = 0.0
     slip[c] = wp.vec3(0.0, 0.0, 0.0)
-    if active > 0.0 and weight[c] > 0.0:
+    if active > 0.0 and weight[c] > 0.0 and depth[c] > 0.0:
         lam[c] = dt[0] * wp.max(stiffness * depth[c] - damping * un, 0.0)
         slip[c] = clamped(-(u - un * n) / weight[c], mu * lam[c])
     p = lam[c] * n + slip[c]

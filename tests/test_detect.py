@@ -13,6 +13,7 @@ RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 # float32 weights of the tets below (edges of 0.1 to 1, coordinates below 10) are good to this;
 # pairs that are closer to a face are left to rounding.
 DOUBT = 1e-3
+SKIN = 0.02  # weight that the skin of stage 1, 1e-3 of an edge, may reach in a flat tet
 LISTS = ["verts", "tets", "edges", "tris", "near"]
 
 
@@ -34,7 +35,7 @@ def brute_force(scene: Scene, x: np.ndarray) -> tuple[set, set]:
                 for i in range(j0, j1):
                     if margin[i] > DOUBT:
                         sure.add((i, body.index))
-                    elif margin[i] > -DOUBT:
+                    elif margin[i] > -SKIN:
                         doubtful.add((i, body.index))
     return sure, doubtful
 

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_contact.kernels import crossing, incidence, penetration
+from warp_contact.kernels import crossing, incidence, penetration, vertex_contact
 from warp_contact.types import Model
 from warp_contact.work import Work
 
@@ -38,10 +38,11 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
     ``fresh``: no overlap is older than the step.
     """
     wp.launch(
-        penetration.vertex_contacts,
+        vertex_contact.vertex_contacts,
         dim=work.capacity.contacts,
         inputs=[model.n_body, fresh, work.surface.id, model.tris, model.body_edge]
-        + [model.vert_body, model.on_surface, model.plane_n, model.plane_h, x0, x]
+        + [model.vert_body, model.on_surface, model.vs_start, model.vs_tri]
+        + [model.plane_n, model.plane_h, x0, x]
         + [work.hit_at, work.hit_vert, work.hit_body]
         + [work.hit_layer, work.hit_depth, work.hit_dir],
         outputs=_records(work),

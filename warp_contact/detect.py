@@ -16,7 +16,7 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
         hits.find_hits,
         dim=work.capacity.verts + 1,
         inputs=[c.n, c.pair, c.items, c.item, model.n_body, model.tets]
-        + [model.vert_body, model.plane_n, model.plane_h, work.candidates.way, x],
+        + [model.vert_body, model.body_edge, model.plane_n, model.plane_h, work.candidates.way, x],
         outputs=[c.wake, work.hit_at],
     )
     wp.utils.array_scan(work.hit_at, work.hit_at, inclusive=False)

@@ -2,13 +2,13 @@
 
 import warp as wp
 
-from warp_contact.kernels import impulse, pair_impulses, penalty
+from warp_contact.kernels import impulse, pair_impulses, penalty, warm
 from warp_contact.response import Penalty
 from warp_contact.types import Model
 from warp_contact.work import Work
 
-SWEEPS = 32  # of the impulses, at most
-TOLERANCE = 1e-4  # of an edge: an approach in one step that is left to the closure
+SWEEPS = 12  # of the impulses, at most: they go on from those of the last step
+TOLERANCE = 1e-5  # of an edge: an approach in one step that is left to the closure
 
 
 def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
@@ -20,6 +20,31 @@ def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
         inputs=[first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
         + [model.inv_mass, model.body_edge, work.dt, x0],
         outputs=[c.weight, c.closing, c.open, c.turn, c.lam, c.slip, c.ahead],
+    )
+
+
+def recall(model: Model, v: wp.array, work: Work) -> None:
+    """Start the contacts of vertices, and ``v``, from the impulses of the last step."""
+    c = work.contacts
+    wp.launch(
+        warm.recall,
+        dim=work.capacity.contacts,
+        inputs=[model.friction, work.n_hit, c.n, c.vert, c.coef, c.normal, c.pair, c.weight]
+        + [c.open, c.turn, work.partner, work.kept],
+        outputs=[c.lam, c.slip, c.ahead, c.part],
+    )
+    _apply(model, v, work)
+
+
+def keep(work: Work) -> None:
+    """Keep the impulses of the vertices for the next step."""
+    c = work.contacts
+    work.partner.fill_(-1)
+    wp.launch(
+        warm.keep,
+        dim=work.capacity.contacts,
+        inputs=[work.n_hit, c.vert, c.pair, c.lam, c.slip],
+        outputs=[work.partner, work.kept],
     )
 
 

@@ -217,6 +217,7 @@ class Simulation:
             work.dt.fill_(0.5 * (self._dt - dt))
             solver.kick(self.model, self.state, work)  # velocities lag by half a step
         work.dt.fill_(dt)
+        work.partner.fill_(-1)  # a frame depends on nothing but the state before it
         work.impulse.zero_()
         work.pair_key.fill_(-1)
         work.pair_total.zero_()

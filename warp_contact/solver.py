@@ -31,6 +31,11 @@ def step(
     """
     c = work.contacts
     exchange = partial(impulse.exchange, model, state.v, work)
+
+    def begin() -> None:
+        impulse.recall(model, state.v, work)
+        exchange()
+
     if isinstance(response, Penalty):
         candidates.refresh(model, state.x, state.x, work)
         vertex_contacts(
@@ -53,10 +58,11 @@ def step(
         predict(model, state, work, stages)
         candidates.refresh(model, state.x, work.x, work)
         vertex_contacts(model, state.x, work.x, work, not search)
-        wp.capture_if(c.n, exchange)
+        wp.capture_if(c.n, begin)
         drift(model, state, work, work.x)
         edge_contacts(model, state.x, work.x, work, not search)
         wp.capture_if(work.n_crossing, exchange)
+        impulse.keep(work)
         impulse.record(model, work, unit)
         drift(model, state, work, state.x)
         edge_contacts(model, state.x, state.x, work, not search)

@@ -48,6 +48,8 @@ class Work:
         stiffness: traction gained over the whole of s [Pa], shape (n_vert,)
         fraction: part of s, shape (n_vert,)
         upper_mean, lower_mean: both sides of each contact, shape (capacity.contacts,)
+        partner: body of each vertex' first contact in the last step, -1 for none, shape (n_vert,)
+        kept: friction and normal impulse of that contact [N s], shape (n_vert,)
         impulse: received by each vertex since the frame began [N s], shape (n_vert,)
         pair_key: bodies of a pair with a contact force, shape (capacity.pairs,)
         pair_total: its impulse since the frame began, in units, shape (capacity.pairs, 3)
@@ -96,6 +98,8 @@ class Work:
     fraction: wp.array
     upper_mean: wp.array
     lower_mean: wp.array
+    partner: wp.array
+    kept: wp.array
     impulse: wp.array
     pair_key: wp.array
     pair_total: wp.array
@@ -157,6 +161,8 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
         fraction=_floats(n),
         upper_mean=_vectors(m),
         lower_mean=_vectors(m),
+        partner=wp.full(n, -1, dtype=int),
+        kept=wp.zeros(n, dtype=wp.vec4),
         impulse=_vectors(n),
         pair_key=wp.full(capacity.pairs, -1, dtype=wp.int64),
         pair_total=wp.zeros((capacity.pairs, 3), dtype=wp.int64),

@@ -19,7 +19,13 @@ STAGES = {  # the functions of a stage; the outermost call counts
     "candidates": ((candidates, "refresh"),),
     "vertex_contacts": ((solver, "vertex_contacts"),),
     "edge_contacts": ((solver, "edge_contacts"),),
-    "impulses": ((impulse, "exchange"), (impulse, "push"), (impulse, "record")),
+    "impulses": (
+        (impulse, "recall"),
+        (impulse, "exchange"),
+        (impulse, "push"),
+        (impulse, "keep"),
+        (impulse, "record"),
+    ),
     "closure": ((solver, "move_surfaces"),),
 }
 OTHER = "other"  # outside of them all

@@ -1,0 +1,77 @@
+"""Impulses of the last step, as a start for those of the next.
+
+What rests on something needs almost the same impulses in every step. A vertex keeps those of its
+first contact for one step, and its next contact with the same body starts from them; contacts of
+edges start from nothing.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.impulse import clamped
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def is_first(c: int, n_hit: int, vert: wp.array2d[int]) -> bool:
+    """Whether contact c is the first of a vertex; hits are sorted by vertex."""
+    return c < n_hit and (c == 0 or vert[c - 1, 0] != vert[c, 0])
+
+
+@wp.kernel
+def recall(
+    # in
+    mu: float,
+    n_hit: wp.array[int],  # (1,)
+    n_contact: wp.array[int],  # (1,)
+    vert: wp.array2d[int],  # (capacity, 5)
+    coef: wp.array2d[float],  # (capacity, 5)
+    normal: wp.array[wp.vec3],  # (capacity,)
+    pair: wp.array[wp.vec2i],  # (capacity,)
+    weight: wp.array[float],  # (capacity,) [1/kg]
+    open: wp.array[float],  # (capacity,) [m]
+    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
+    partner: wp.array[int],  # (n_vert,) body of the first contact in the last step, or -1
+    kept: wp.array[wp.vec4],  # (n_vert,) [N s] its friction and normal impulse
+    # out
+    lam: wp.array[float],  # (capacity,) [N s]
+    slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    ahead: wp.array[wp.vec4],  # (capacity,) [N s]
+    part: wp.array[wp.vec3],  # (5 capacity,) [N s] what they are at each vertex
+):
+    """One thread per contact."""
+    c = wp.tid()
+    if c >= n_contact[0]:
+        return
+    p = wp.vec3(0.0, 0.0, 0.0)
+    n = normal[c]
+    i = vert[c, 0]
+    if weight[c] > 0.0 and is_first(c, n_hit[0], vert) and partner[i] == pair[c][1]:
+        old = kept[i]
+        rubbed = wp.vec3(old[0], old[1], old[2])
+        rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu * old[3])
+        lam[c] = old[3]
+        slip[c] = rubbed
+        ahead[c] = wp.vec4(rubbed[0], rubbed[1], rubbed[2], old[3])
+        p = old[3] * n + rubbed
+    for k in range(5):
+        part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n
+
+
+@wp.kernel
+def keep(
+    # in
+    n_hit: wp.array[int],  # (1,)
+    vert: wp.array2d[int],  # (capacity, 5)
+    pair: wp.array[wp.vec2i],  # (capacity,)
+    lam: wp.array[float],  # (capacity,) [N s]
+    slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    # out
+    partner: wp.array[int],  # (n_vert,)
+    kept: wp.array[wp.vec4],  # (n_vert,) [N s]
+):
+    """One thread per contact of a vertex."""
+    c = wp.tid()
+    if is_first(c, wp.min(n_hit[0], lam.shape[0]), vert):
+        partner[vert[c, 0]] = pair[c][1]
+        kept[vert[c, 0]] = wp.vec4(slip[c][0], slip[c][1], slip[c][2], lam[c])

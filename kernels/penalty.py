@@ -1,14 +1,13 @@
 """The response the paper compares with: a force proportional to the penetration depth.
 
-Heidelberger et al. 2004, with Coulomb friction as in Keiser et al. 2004:
+Heidelberger et al. 2004, with Coulomb friction as in Keiser et al. 2004 (one_pass.py):
 
     lambda = h max(0, k d - c u . n)              normal impulse of a step [N s]
-    p_t = -min(mu lambda, |u_t| / W) u_t^         friction
 """
 
 import warp as wp
 
-from warp_contact.kernels.impulse import clamped
+from warp_contact.kernels.one_pass import give, relative_velocity
 
 wp.set_module_options({"enable_backward": False})
 
@@ -38,18 +37,8 @@ def penalty_impulses(
     c = wp.tid()
     if c >= n_contact[0]:
         return
-    u = wp.vec3(0.0, 0.0, 0.0)
-    active = float(0.0)
-    for k in range(5):
-        u += coef[c, k] * v[vert[c, k]]
-        active += wp.abs(coef[c, k])
-    n = normal[c]
-    un = wp.dot(u, n)
-    lam[c] = 0.0
-    slip[c] = wp.vec3(0.0, 0.0, 0.0)
-    if active > 0.0 and weight[c] > 0.0 and depth[c] > 0.0:
-        lam[c] = dt[0] * wp.max(stiffness * depth[c] - damping * un, 0.0)
-        slip[c] = clamped(-(u - un * n) / weight[c], mu * lam[c])
-    p = lam[c] * n + slip[c]
-    for k in range(5):
-        part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n
+    u = relative_velocity(c, vert, coef, v)
+    p = float(0.0)
+    if weight[c] > 0.0 and depth[c] > 0.0:
+        p = dt[0] * wp.max(stiffness * depth[c] - damping * wp.dot(u, normal[c]), 0.0)
+    give(c, p, u, mu, coef, normal, weight, open, turn, lam, slip, part)

@@ -13,6 +13,63 @@ def tools(monkeypatch):
     monkeypatch.syspath_prepend(TOOLS)
 
 
+def panel():
+    from charting.panel import Panel
+
+    import warp_contact as wc
+
+    def build() -> wc.Scene:
+        scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+        for k in range(2):
+            mesh, rubber = wc.box(0.1, 1), wc.NeoHookean(1e5, 0.3, 1000.0)
+            scene.add_body(mesh, rubber, (0.0, 0.0, 0.101 * k), velocity=(0.0, 0.0, -0.5 * k))
+        return scene
+
+    return Panel("A", "title", build, 240, 2, lambda panel, motion: 0.0, 1000.0)
+
+
+def test_the_impulses_alone_move_no_surface(monkeypatch):
+    from charting import methods, ours
+
+    from warp_contact import solver
+
+    calls = []
+    monkeypatch.setattr(solver, "move_surfaces", lambda *args: calls.append(args))
+    settings = {setting.method: setting for setting in methods.own(quick=True)[::-1]}
+    ours.run(panel(), settings["impulses alone"], None, 60.0)
+    assert calls == []
+    ours.run(panel(), settings["default"], None, 60.0)
+    assert calls != []
+
+
+def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
+    import pareto
+    from charting import methods
+    from charting.panel import Failed, Motion
+
+    own = methods.own(quick=False)
+    own.append(methods.Own("broken", factor=1))
+    own.append(methods.Own("broken", factor=2))
+    alike = dict.fromkeys((s.method, s.times) for s in own)
+    alone = {key: 3 + 2 * k for k, key in enumerate(alike)}
+    taken = {}
+
+    def run(panel, setting, steps, limit):
+        if setting.method == "broken":
+            raise Failed("not finite")
+        taken[setting] = steps
+        return Motion(None, None, "", 1.0, 0.0, steps or alone[setting.method, setting.times])
+
+    monkeypatch.setattr(methods, "own", lambda quick: own)
+    monkeypatch.setattr(methods, "PEERS", {})
+    monkeypatch.setattr(pareto.ours, "run", run)
+    points = pareto.one(panel(), False, "", 1.0)
+    for s, steps in taken.items():
+        assert steps == (None if s.factor == 1 else s.factor * alone[s.method, s.times])
+    assert [p.outcome for p in points if p.failed] == ["not finite", "no run with steps x1"]
+    assert {s.factor for s in taken if s.method == "predicted"} == {1, 2, 4}
+
+
 def points():
     from charting.result import Point
 

@@ -7,6 +7,7 @@ from warp_contact import (
     ContactSurface,
     NeoHookean,
     Penalty,
+    PredictedForce,
     Scene,
     Simulation,
     SimulationError,
@@ -18,7 +19,12 @@ from warp_contact import (
 G = 9.81
 SOFT = NeoHookean(2e4, 0.3, 1000.0, 1e-3)
 DRY = NeoHookean(1e5, 0.3, 1000.0)  # without damping
-RESPONSES = [ContactSurface(), ContactSurface("literal"), Penalty(500.0)]
+RESPONSES = [
+    pytest.param(ContactSurface(), id="balanced"),
+    pytest.param(ContactSurface("literal"), id="literal"),
+    pytest.param(Penalty(500.0), id="penalty"),
+    pytest.param(PredictedForce(), id="predicted"),
+]
 
 
 def heap(friction: float = 0.3, order=(0, 1, 2), damping: float = 0.0) -> Scene:
@@ -61,7 +67,7 @@ def test_a_body_in_free_fall_follows_symplectic_euler():
     np.testing.assert_allclose(sim.velocities()[:, 2], -G * t, rtol=1e-5)
 
 
-@pytest.mark.parametrize("response", RESPONSES, ids=lambda r: getattr(r, "search", "penalty"))
+@pytest.mark.parametrize("response", RESPONSES)
 def test_two_runs_agree_in_every_bit(response):
     one, two = (run(heap(damping=1e-3), 12, response=response) for _ in range(2))
     assert met(one)

@@ -1,10 +1,10 @@
-"""A vertex against a triangle: impulse.py in closed form, the penalty forces too."""
+"""A vertex against a triangle: impulse.py in closed form, penalty and predicted forces too."""
 
 import numpy as np
 import pytest
 import warp as wp
 
-from warp_contact import NeoHookean, Penalty, Scene, TetMesh, impulse
+from warp_contact import NeoHookean, Penalty, PredictedForce, Scene, TetMesh, impulse, solver
 
 DT = 1e-3
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -112,3 +112,63 @@ def test_a_penalty_impulse_is_stiffness_times_depth_less_damping(
     # A depth of 0.01 in coordinates of order 1: 1e-5 of the impulse.
     np.testing.assert_allclose(state.v.numpy() - v0, want - v0, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(records(work).lam, normal, rtol=1e-4)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2, 2.0])
+def test_a_predicted_force_is_the_overlap_over_the_step_squared_and_the_weight(
+    rng, stages, find_contacts, records, friction
+):
+    overlap, u = 0.002, np.array([1.0, -0.5, 0.3])
+    scene, a = tip_on_triangle(rng, friction, u)
+    model, state, work = stages(scene, dt=DT)
+    v0 = state.v.numpy().astype(float)
+    ahead = state.x.numpy() + DT * v0
+    ahead[4:, 2] -= overlap + DT * u[2]
+    ahead = wp.array(ahead, dtype=wp.vec3)
+    find_contacts(model, work, state.x, ahead)
+    impulse.push_apart(model, ahead, state.v, work)
+    who = np.array([4, 0, 1, 2])
+    mass = model.mass.numpy().astype(float)[who]
+    w = (a * a / mass).sum()
+    normal, along = overlap / (DT * w), np.linalg.norm(u[:2])
+    drag = min(friction * normal, along / w)
+    want = v0.copy()
+    want[who] += (a / mass)[:, None] * np.array([*(-drag * u[:2] / along), normal])
+    # An overlap of 0.002 in coordinates of order 1: 1e-4 of the impulse, 2 m/s.
+    np.testing.assert_allclose(state.v.numpy(), want, atol=1e-3)
+    np.testing.assert_allclose(records(work).lam, normal, rtol=3e-4)
+    np.testing.assert_allclose(np.linalg.norm(records(work).slip, axis=1), drag, rtol=3e-4)
+
+
+def test_a_step_with_predicted_forces_closes_a_single_gap_and_keeps_the_momentum(rng, stages):
+    height = 0.001
+    scene, a = tip_on_triangle(rng, 0.0, np.array([0.5, -1.0, -3.0]))
+    model, state, work = stages(scene, dt=DT)
+    x = state.x.numpy()
+    x[4:, 2] += height
+    state.x.assign(x)
+    v0, mass = state.v.numpy().astype(float), model.mass.numpy().astype(float)[:, None]
+    solver.step(model, state, work, PredictedForce(), 0, False, 1e-9)
+    x1, v1 = state.x.numpy().astype(float), state.v.numpy().astype(float)
+    gap = a @ x1[[4, 0, 1, 2], 2]
+    print(f"gap {gap:.1e} m, without contact {height - 3.0 * DT:.1e} m")
+    # Rounding of coordinates up to 5; the normal is that of the predicted triangle, z.
+    assert abs(gap) < 2e-6
+    passed, carried = (np.abs(mass * v).sum() for v in (v1 - v0, v0))
+    assert passed > 1e-4 * carried
+    # One rounding of every velocity.
+    np.testing.assert_allclose((mass * (v1 - v0)).sum(axis=0), 0.0, atol=1e-7 * carried)
+
+
+def test_predicted_forces_leave_a_vertex_in_the_skin_alone(rng, stages, find_contacts, records):
+    scene, _ = tip_on_triangle(rng, 0.5, np.array([1.0, 0.0, -2.0]))
+    model, state, work = stages(scene, dt=DT)
+    x = state.x.numpy()
+    x[4:, 2] += 1e-3
+    ahead = wp.array(x, dtype=wp.vec3)
+    find_contacts(model, work, state.x, ahead)
+    v0 = state.v.numpy().copy()
+    impulse.push_apart(model, ahead, state.v, work)
+    c = records(work)
+    assert c.n == 1 and c.weight[0] > 0.0 and c.depth[0] < 0.0
+    np.testing.assert_array_equal(state.v.numpy(), v0)

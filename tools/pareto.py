@@ -79,13 +79,17 @@ def count(quick: bool) -> int:
 
 def one(panel: Panel, quick: bool, python: str, limit: float) -> list[Point]:
     """Every method in one panel, printed as they come."""
-    points, steps = [], None
+    points, steps = [], {}
     for setting in methods.own(quick):
+        alike = setting.method, setting.times
         try:
-            many = None if setting.factor == 1 else setting.factor * (steps or 1)
-            motion = ours.run(panel, setting.response(panel), many, limit)
             if setting.factor == 1:
-                steps = motion.steps
+                motion = ours.run(panel, setting, None, limit)
+                steps[alike] = motion.steps
+            elif alike in steps:
+                motion = ours.run(panel, setting, setting.factor * steps[alike], limit)
+            else:
+                raise Failed("no run with steps x1")
         except Failed as failed:
             motion = failed
         points += judge(panel, setting.method, str(setting), motion)

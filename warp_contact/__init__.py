@@ -4,7 +4,7 @@ from warp_contact.errors import SimulationError
 from warp_contact.materials import Corotated, NeoHookean, SpringNetwork
 from warp_contact.measure import Measure
 from warp_contact.mesh import MeshError, TetMesh
-from warp_contact.response import ContactSurface, Penalty
+from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.scene import Body, Scene
 from warp_contact.shapes import box, cylinder, dish, sphere
 from warp_contact.simulation import Simulation
@@ -18,6 +18,7 @@ __all__ = [
     "MeshError",
     "NeoHookean",
     "Penalty",
+    "PredictedForce",
     "Scene",
     "Simulation",
     "SimulationError",

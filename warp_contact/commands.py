@@ -16,12 +16,12 @@ from warp_contact.errors import UsageError
 from warp_contact.mesh import TetMesh
 from warp_contact.progress import Progress
 from warp_contact.render import animate, render
-from warp_contact.response import ContactSurface, Penalty
+from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.simulation import Simulation
 from warp_contact.usd import UsdWriter, frame_numbers, open_stage, read_bodies
 from warp_contact.usd_check import problems
 
-RESPONSES = ("contact-surface", "literal", "penalty")
+RESPONSES = ("contact-surface", "literal", "penalty", "predicted")
 
 
 def run(args) -> int:
@@ -131,6 +131,8 @@ def response(module: ModuleType, args):
         return ContactSurface()
     if args.response == "literal":
         return ContactSurface(search="literal")
+    if args.response == "predicted":
+        return PredictedForce()
     if not hasattr(module, "PENALTY"):
         raise UsageError(f"{args.scene} has no PENALTY = {{'stiffness': ..., 'damping': ...}}")
     return Penalty(**module.PENALTY)

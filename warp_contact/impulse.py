@@ -1,8 +1,8 @@
-"""Stage 5: impulses between the bodies, and the penalty forces that the paper compares with."""
+"""Stage 5: impulses between the bodies; penalty and predicted forces, to compare with."""
 
 import warp as wp
 
-from warp_contact.kernels import impulse, pair_impulses, penalty, warm
+from warp_contact.kernels import impulse, pair_impulses, penalty, predicted, warm
 from warp_contact.response import Penalty
 from warp_contact.types import Model
 from warp_contact.work import Work
@@ -83,6 +83,19 @@ def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:
         dim=work.capacity.contacts,
         inputs=[response.stiffness, response.damping, model.friction, work.dt]
         + [c.n, c.vert, c.coef, c.normal, c.depth, c.weight, c.open, c.turn, v],
+        outputs=[c.lam, c.slip, c.part],
+    )
+    _apply(model, v, work)
+
+
+def push_apart(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
+    """Change ``v`` by the forces that close the gaps at the predicted positions ``x``."""
+    c = work.contacts
+    wp.launch(
+        predicted.predicted_impulses,
+        dim=work.capacity.contacts,
+        inputs=[model.n_body, model.friction, work.dt]
+        + [c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.weight, c.open, c.turn, x, v],
         outputs=[c.lam, c.slip, c.part],
     )
     _apply(model, v, work)

@@ -43,3 +43,14 @@ class Penalty:
             raise ValueError(f"penalty stiffness {self.stiffness} is not positive")
         if not (math.isfinite(self.damping) and self.damping >= 0.0):
             raise ValueError(f"penalty damping {self.damping} is negative")
+
+
+@dataclass(frozen=True)
+class PredictedForce:
+    """Forces that close the overlaps predicted for the end of the step; nothing to choose.
+
+    After Spillmann, Becker & Teschner, "Non-iterative computation of contact forces for deformable
+    objects" (WSCG 2007): one pass over the contacts, without iteration, search or closure. It is a
+    reconstruction from the idea, not from the formulas of the paper; ``kernels/predicted.py`` has
+    those used here.
+    """

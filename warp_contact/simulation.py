@@ -13,7 +13,7 @@ from warp_contact.errors import SimulationError
 from warp_contact.forces import MARGIN, stages_for
 from warp_contact.measure import Measure, Meter
 from warp_contact.progress import Progress
-from warp_contact.response import ContactSurface, Penalty
+from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.scene import Body, Scene
 from warp_contact.spectrum import Spectrum
 from warp_contact.types import Capacity, State
@@ -49,7 +49,7 @@ class Simulation:
     def __init__(
         self,
         scene: Scene,
-        response: ContactSurface | Penalty | None = None,
+        response: ContactSurface | Penalty | PredictedForce | None = None,
         fps: float = 60,
         substeps: int | None = None,
         device: str | None = None,

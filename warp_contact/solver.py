@@ -7,7 +7,7 @@ import warp as wp
 from warp_contact import candidates, depth, detect, impulse, surface
 from warp_contact.forces import damp, internal_forces
 from warp_contact.kernels import motion
-from warp_contact.response import ContactSurface, Penalty
+from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.types import Model, State
 from warp_contact.work import Work
 
@@ -18,7 +18,7 @@ def step(
     model: Model,
     state: State,
     work: Work,
-    response: ContactSurface | Penalty,
+    response: ContactSurface | Penalty | PredictedForce,
     stages: int,
     search: bool,
     unit: float,
@@ -44,6 +44,14 @@ def step(
         edge_contacts(model, state.x, state.x, work, False)
         predict(model, state, work, stages)
         wp.capture_if(c.n, lambda: impulse.push(model, state.v, work, response))
+        impulse.record(model, work, unit)
+        drift(model, state, work, state.x)
+    elif isinstance(response, PredictedForce):
+        predict(model, state, work, stages)
+        candidates.refresh(model, state.x, work.x, work)
+        vertex_contacts(model, state.x, work.x, work, False)  # overlaps may last some steps
+        edge_contacts(model, state.x, work.x, work, False)
+        wp.capture_if(c.n, lambda: impulse.push_apart(model, work.x, state.v, work))
         impulse.record(model, work, unit)
         drift(model, state, work, state.x)
     elif response.search == "literal":

@@ -23,6 +23,7 @@ STAGES = {  # the functions of a stage; the outermost call counts
         (impulse, "recall"),
         (impulse, "exchange"),
         (impulse, "push"),
+        (impulse, "push_apart"),
         (impulse, "keep"),
         (impulse, "record"),
     ),

@@ -12,8 +12,13 @@ STIFFNESSES = 0.01, 0.1, 1.0, 10.0, 100.0  # of that of the panel
 class Own:
     """A response of this package at one setting.
 
-    ``factor``: substeps over those that the simulation takes by itself; 1 leaves it to it.
-    ``times``: stiffness of a penalty over that of the panel.
+    Attributes:
+        method: name of the method
+        search: of a contact surface; empty for other responses
+        iterations: of that search
+        factor: substeps over those that the simulation takes by itself; 1 leaves it to it
+        times: stiffness of a penalty over that of the panel; 0 for other responses
+        surfaces: whether surfaces are moved; False leaves the contact to the impulses
     """
 
     method: str
@@ -21,24 +26,31 @@ class Own:
     iterations: int = 4
     factor: int = 1
     times: float = 0.0
+    surfaces: bool = True
 
     def __str__(self):
         """The knobs."""
         if self.times:
             return f"stiffness x{self.times:g}, steps x{self.factor}"
-        return f"iterations {self.iterations}, steps x{self.factor}"
+        if self.search and self.surfaces:
+            return f"iterations {self.iterations}, steps x{self.factor}"
+        return f"steps x{self.factor}"
 
     def response(self, panel: Panel):
         """For a panel; the damping of a penalty keeps its ratio."""
         if self.times:
             return wc.Penalty(self.times * panel.stiffness, self.times**0.5 * panel.damping)
+        if not self.search:
+            return wc.PredictedForce()
         return wc.ContactSurface(self.search, self.iterations)
 
 
 def own(quick: bool) -> list[Own]:
-    """Settings of ``ContactSurface()``, of its literal search, and of penalties."""
+    """Settings of ``ContactSurface()``, its impulses, its literal search, and other forces."""
     out = [Own("default", "balanced", 4, f) for f in (1, 2, 4)]
     out += [Own("default", "balanced", n) for n in (2, 8)]
+    out += [Own("impulses alone", "balanced", factor=f, surfaces=False) for f in (1, 2, 4)]
+    out += [Own("predicted", factor=f) for f in (1, 2, 4)]
     out += [Own("literal", "literal", n) for n in (4, 8, 16)]
     out += [Own("penalty", times=k) for k in STIFFNESSES]
     if quick:

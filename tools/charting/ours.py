@@ -1,14 +1,28 @@
 """Run a panel with a response of this package."""
 
+from contextlib import nullcontext
 from time import perf_counter
+from unittest import mock
 
 import numpy as np
 
 import warp_contact as wc
+from charting.methods import Own
 from charting.panel import Failed, Motion, Panel, placed
+from warp_contact import solver
 
 
-def run(panel: Panel, response, substeps: int | None, limit: float) -> Motion:
+def run(panel: Panel, setting: Own, substeps: int | None, limit: float) -> Motion:
+    """The motion in a panel at a setting; arguments as in ``play``.
+
+    Without surfaces the last stage of a step is left out. It is no option of the package.
+    """
+    still = nullcontext() if setting.surfaces else mock.patch.object(solver, "move_surfaces")
+    with still:
+        return play(panel, setting.response(panel), substeps, limit)
+
+
+def play(panel: Panel, response, substeps: int | None, limit: float) -> Motion:
     """Every frame; the first one, which compiles and captures, is not timed.
 
     Args:

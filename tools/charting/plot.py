@@ -14,6 +14,8 @@ from charting.result import Point
 STYLES = {  # method: (colour, marker)
     "default": ("#c8401e", "o"),
     "literal": ("#e8a33d", "D"),
+    "impulses alone": ("#8a5a9e", "p"),
+    "predicted": ("#3d9a93", "h"),
     "penalty": ("#7a7a7a", "v"),
     "Newton VBD": ("#2060a8", "s"),
     "Newton XPBD": ("#5fa8d8", "^"),

@@ -15,7 +15,7 @@ from warp_contact.scene import rotation_matrix
 G = 9.81  # [m/s^2]
 MESHES = "structured", "mirrored", "jittered"
 JITTER = 0.15  # of a cell: largest shift of a vertex; no tet comes near to inverting
-RESPONSES = "default", "literal", "penalty"
+RESPONSES = "default", "literal", "penalty", "predicted"
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,8 @@ class Ask:
         """The response; a penalty takes the constants of the case [N/m], [N s/m]."""
         if self.response == "penalty":
             return wc.Penalty(stiffness, damping)
+        if self.response == "predicted":
+            return wc.PredictedForce()
         return wc.ContactSurface("literal" if self.response == "literal" else "balanced")
 
 

@@ -160,17 +160,17 @@ def move_surfaces(
         else:
             surface.balance(model, state.x, work, response)
 
-    def close() -> None:
-        if search:
-            wp.capture_if(work.found[1:2], find_surface)
+    def close(looks: int = LOOKS) -> None:
         surface.close(model, state.x, state.v, work, search)
         # Moved vertices leave edges across each other that stage 2 could not see.
-        for _ in range(LOOKS):
+        if looks > 0:
             edge_contacts(model, state.x, state.x, work, not search)
-            wp.capture_if(work.n_crossing, close_edges)
+            surface.leftover(model, state.x, work)
+            wp.capture_if(work.found[0:1], partial(close, looks - 1))
 
-    def close_edges() -> None:
-        surface.leftover(model, state.x, work)
-        wp.capture_if(work.found[0:1], lambda: surface.close(model, state.x, state.v, work, search))
+    def resolve() -> None:
+        if search:
+            wp.capture_if(work.found[1:2], find_surface)
+        close()
 
-    wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else close)
+    wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else resolve)

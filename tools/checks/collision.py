@@ -22,7 +22,7 @@ GAP = 0.004  # at the start [m]
 SHIFT = np.array([0.02, 0.013, 0.0])  # sideways [m]
 ANGLES = 17.0, 31.0, 53.0  # about x, then y, then z [degrees]
 FPS = 240  # the blocks touch for some 40 ms
-DURATION = 0.5  # [s]
+DURATION = 0.25  # [s]
 
 CELLS = (3, 3), (2, 5), (8, 8), (1, 1)
 RATIOS = 1.0, 100.0  # of Young's moduli

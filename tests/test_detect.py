@@ -204,6 +204,22 @@ def pile(rng, turned) -> Scene:
     return scene
 
 
+def test_buffers_that_grow_on_the_way_change_nothing(rng, turned):
+    scene = pile(rng, turned)
+    tight, ample = Simulation(scene), Simulation(scene)
+    for frame in range(8):
+        if frame == 4:
+            tight._work = allocate_work(tight.model, tight.state, Capacity(*[1] * 7))
+            tight._graphs.clear()
+        for sim in (tight, ample):
+            # Short steps, which lengthen by a part from frame to frame, not from try to try.
+            sim.substeps = max(sim.substeps, 40)
+            sim.step_frame()
+        assert tight.substeps == ample.substeps
+        np.testing.assert_array_equal(tight.positions(), ample.positions())
+        np.testing.assert_array_equal(tight.velocities(), ample.velocities())
+
+
 def test_candidates_kept_for_many_steps_give_the_same_bits_as_new_ones(rng, turned, monkeypatch):
     scene = pile(rng, turned)
     kept, renewed = Simulation(scene), Simulation(scene)

@@ -129,8 +129,9 @@ class Simulation:
             while self._search is None or self._grow():
                 self._search = solver.overlaps(self.model, self.state, self._work)
             omega, rate = self._rates or self._spectra()
+            fewest = int(KEEP * self.substeps)
             for _attempt in range(ATTEMPTS):
-                dt = self._run(omega, rate)
+                dt = self._run(omega, rate, fewest)
                 if self._grow():
                     self._restore()
                     continue
@@ -207,10 +208,10 @@ class Simulation:
             "partner": partner,
         }
 
-    def _run(self, omega: float, rate: float) -> float:
+    def _run(self, omega: float, rate: float, fewest: int) -> float:
         """Step one frame at the rates [1/s] given; return the step [s]."""
         work = self._work
-        n = self._wanted or self._substeps(omega)
+        n = self._wanted or max(fewest, self._substeps(omega))
         dt = 1.0 / (self.fps * n)
         stages = stages_for(rate, dt)
         if self._dt is not None and dt != self._dt:
@@ -243,7 +244,7 @@ class Simulation:
         passing = speed / (REACH * self._thickness)
         clean = min(speed / (TRAVEL * self._edge), PATIENCE * stable)
         wanted = math.ceil(max(stable, passing, clean) / self.fps)
-        return max(1, wanted, int(KEEP * self.substeps))
+        return max(1, wanted)
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured step with so many stages of damping."""

@@ -11,7 +11,7 @@ from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.types import Model, State
 from warp_contact.work import Work
 
-LOOKS = 3  # at the edges after the closure, each followed by another closure
+LOOKS = 3  # after the closure, at the vertices and edges again, each followed by another closure
 
 
 def step(
@@ -38,9 +38,8 @@ def step(
 
     if isinstance(response, Penalty):
         candidates.refresh(model, state.x, state.x, work)
-        vertex_contacts(
-            model, state.x, state.x, work, False
-        )  # forces belong to the positions they act at
+        # Forces belong to the positions they act at.
+        vertex_contacts(model, state.x, state.x, work, False)
         edge_contacts(model, state.x, state.x, work, False)
         predict(model, state, work, stages)
         wp.capture_if(c.n, lambda: impulse.push(model, state.v, work, response))
@@ -162,7 +161,10 @@ def move_surfaces(
 
     def close(looks: int = LOOKS) -> None:
         surface.close(model, state.x, state.v, work, search)
-        # Moved vertices leave edges across each other that stage 2 could not see.
+        # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
+        # may cross that it could not see.
+        if looks == LOOKS:
+            vertex_contacts(model, state.x, state.x, work, not search)
         if looks > 0:
             edge_contacts(model, state.x, state.x, work, not search)
             surface.leftover(model, state.x, work)

@@ -5,8 +5,12 @@ its body from there, all that touches is among them, and the steps test them exa
 contacts come out as without (Verlet 1967). They are found again once some vertex has moved by half
 the skin; the other half is for what impulses and the closure add to the prediction within a step.
 
-    skin = SPAN times the largest motion of the body in a step, from LEAST to MOST of the shortest
-           edge, and the largest motion of the bodies near it, which may push it on      [m]
+    skin = span times the largest motion of the body in a step, but LEAST of the shortest edge,
+           and the largest motion of the bodies near it, which may push it on             [m]
+
+Half the span is the number of steps that candidates last. It is the same for all bodies, and such
+that the mean of them has a skin of MEAN edges: some fast bodies do not wear out the candidates of a
+pile at rest, and where all are fast the lists stay short.
 
 Most candidates are not close to touching. A pair that is found apart by some distance sleeps until
 both bodies have come that way together; ``way`` adds up the largest motion of a body in each look.
@@ -23,10 +27,11 @@ from warp_contact.kernels.pairs import append
 
 wp.set_module_options({"enable_backward": False})
 
-SPAN = wp.constant(16.0)  # half of it is the number of steps that candidates last
 LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
-MOST = wp.constant(0.1)  # of the shortest edge: longer lists cost more than they save
-FEWEST = wp.constant(6.0)  # largest motions in a step that the skin must hold all the same
+MEAN = wp.constant(0.08)  # of the shortest edge: longer lists cost more than they save
+SHORTEST = wp.constant(8.0)  # span
+LONGEST = wp.constant(64.0)  # span
+UNIT = wp.constant(1.0e5)  # counts of an edge, for a sum that does not depend on its order
 CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the maximum
 
@@ -77,17 +82,23 @@ def track(
 @wp.kernel
 def find_fastest(
     # in
+    edge: float,  # shortest mean edge of a body [m]
     motion: wp.array[float],  # (n_body,) [m]
     # out, added to
     fastest: wp.array[float],  # (1,) [m]
+    total: wp.array[int],  # (1,) sum of the motions, none above an edge, in edges / UNIT
 ):
     """One thread per body."""
-    wp.atomic_max(fastest, 0, motion[wp.tid()])
+    m = wp.tid()
+    wp.atomic_max(fastest, 0, motion[m])
+    wp.atomic_add(total, 0, int(UNIT * wp.min(motion[m] / edge, 1.0)))
 
 
 @wp.func
-def own_skin(motion: float, edge: float) -> float:
-    return wp.max(wp.clamp(SPAN * motion, LEAST * edge, MOST * edge), FEWEST * motion)
+def own_skin(motion: float, edge: float, total: int, n_body: int) -> float:
+    mean = float(total) / (UNIT * float(n_body))
+    span = wp.clamp(MEAN / wp.max(mean, 1.0e-6), SHORTEST, LONGEST)
+    return wp.max(span * motion, LEAST * edge)
 
 
 @wp.kernel
@@ -95,13 +106,14 @@ def widest_skins(
     # in
     edge: float,  # shortest mean edge of a body [m]
     fastest: wp.array[float],  # (1,) [m]
+    total: wp.array[int],  # (1,) sum of the motions
     motion: wp.array[float],  # (n_body,) [m]
     # out
     skin: wp.array[float],  # (n_body,) [m]
 ):
     """One thread per body: the skin it would have next to the fastest body."""
     m = wp.tid()
-    skin[m] = own_skin(motion[m], edge) + fastest[0]
+    skin[m] = own_skin(motion[m], edge, total[0], motion.shape[0]) + fastest[0]
 
 
 @wp.kernel
@@ -109,6 +121,7 @@ def choose_skins(
     # in
     edge: float,  # shortest mean edge of a body [m]
     fastest: wp.array[float],  # (1,) [m]
+    total: wp.array[int],  # (1,) sum of the motions
     motion: wp.array[float],  # (n_body,) [m]
     n_near: wp.array[int],  # (n_body,)
     near: wp.array2d[int],  # (n_body, MANY)
@@ -123,7 +136,7 @@ def choose_skins(
         push = float(0.0)
         for k in range(n_near[m]):
             push = wp.max(push, motion[near[m, k]])
-    skin[m] = own_skin(motion[m], edge) + push
+    skin[m] = own_skin(motion[m], edge, total[0], motion.shape[0]) + push
     stale[0] = 0
 
 

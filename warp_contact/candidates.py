@@ -53,8 +53,14 @@ def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
     c.motion.zero_()
     c.fastest.zero_()
     _move(model, x1, work)
-    wp.launch(candidates.find_fastest, dim=model.n_body, inputs=[c.motion], outputs=[c.fastest])
-    moving = [c.edge, c.fastest, c.motion]
+    c.total.zero_()
+    wp.launch(
+        candidates.find_fastest,
+        dim=model.n_body,
+        inputs=[c.edge, c.motion],
+        outputs=[c.fastest, c.total],
+    )
+    moving = [c.edge, c.fastest, c.total, c.motion]
     wp.launch(candidates.widest_skins, dim=model.n_body, inputs=moving, outputs=[c.skin])
     _find_near(model, work)
     wp.launch(

@@ -158,6 +158,7 @@ class Candidates:
         skin: how far from them they hold [m], shape (n_body,)
         motion: largest motion of each body since the last look [m], shape (n_body,)
         fastest: largest of these when they were found [m], shape (1,)
+        total: their sum, in counts of kernels/candidates.py, shape (1,)
         stale: whether they have to be found again, shape (1,)
         edge: shortest mean edge of a body [m]
         verts: vertices and bodies with tets; a plane is a body with one tet
@@ -173,6 +174,7 @@ class Candidates:
     skin: wp.array
     motion: wp.array
     fastest: wp.array
+    total: wp.array
     stale: wp.array
     edge: float
     verts: Pairs

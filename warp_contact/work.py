@@ -220,6 +220,7 @@ def _allocate_candidates(model: Model, capacity: Capacity) -> Candidates:
         skin=_floats(model.n_body),
         motion=_floats(model.n_body),
         fastest=_floats(1),
+        total=_ints(1),
         stale=wp.full(1, 1, dtype=int),
         edge=float(model.body_edge.numpy().min()),
         verts=_allocate_pairs(model.n_vert, capacity.verts, capacity.tets),

@@ -115,3 +115,12 @@ def relax(
         if j == s:
             u = 0.5 * (u + v[i])
     y[i] = u
+
+
+@wp.kernel
+def count_down(
+    # in, out
+    steps: wp.array[int],  # (1,) steps that the frame still has
+):
+    """One thread, at the end of a step."""
+    steps[0] = steps[0] - 1

@@ -225,9 +225,8 @@ class Simulation:
         work.contacts.needed.zero_()
         work.deep_found.zero_()
         work.bodies.rebuild()
-        graph = self._graph(stages)
-        for _ in range(n):
-            wp.capture_launch(graph)
+        work.steps.fill_(n)
+        wp.capture_launch(self._graph(stages))
         self.substeps = n
         return dt
 
@@ -247,12 +246,12 @@ class Simulation:
         return max(1, wanted)
 
     def _graph(self, stages: int) -> wp.Graph:
-        """The captured step with so many stages of damping."""
+        """The captured steps of a frame, with so many stages of damping."""
         key = stages, self._search
         if key not in self._graphs:
             arguments = self.model, self.state, self._work, self.response, *key, self._unit
             with wp.ScopedCapture() as capture:
-                solver.step(*arguments)
+                solver.steps(*arguments)
             self._graphs[key] = capture.graph
         return self._graphs[key]
 

@@ -76,6 +76,16 @@ def step(
         move_surfaces(model, state, work, response, search)  # what the step did not create
 
 
+def steps(model: Model, state: State, work: Work, *others) -> None:
+    """Take ``work.steps`` steps, with the arguments of ``step``; for a capture."""
+
+    def one() -> None:
+        step(model, state, work, *others)
+        wp.launch(motion.count_down, dim=1, inputs=[], outputs=[work.steps])
+
+    wp.capture_while(work.steps, one)
+
+
 def overlaps(model: Model, state: State, work: Work) -> bool:
     """Whether bodies overlap by more than a search is worth; reads back, so not for a step.
 

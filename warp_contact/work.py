@@ -16,6 +16,7 @@ class Work:
     Attributes:
         capacity: what there is room for
         dt: the step [s], shape (1,)
+        steps: how many the frame still has, shape (1,)
         ones: a mask that lets every tet pass, shape (n_tet,)
         mask: tets that touch the deformation region, shape (n_tet,)
         f_tet: forces on the corners of each tet [N], shape (n_tet, 4)
@@ -57,6 +58,7 @@ class Work:
 
     capacity: Capacity
     dt: wp.array
+    steps: wp.array
     ones: wp.array
     mask: wp.array
     f_tet: wp.array
@@ -120,6 +122,7 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
     return Work(
         capacity=capacity,
         dt=wp.zeros(1, dtype=float),
+        steps=wp.zeros(1, dtype=int),
         ones=wp.full(model.n_tet, 1, dtype=int),
         mask=_ints(model.n_tet),
         f_tet=wp.zeros((model.n_tet, 4), dtype=wp.vec3),

@@ -27,7 +27,8 @@ CASES = {
     "friction": "A5 Coulomb friction",
     "bars": "A4 impact of bars",
     "patch": "A2 contact patch test",
-    "hertz": "A3 Hertz",
+    "hertz": "A3 Hertz, spheres",
+    "cylinder": "A3 Hertz, cylinder",
     "facets": "A9 sliding over facets",
     "orders": "A8 orders of convergence",
 }

@@ -49,6 +49,10 @@ def test_sliding_converges_with_the_first_order_of_the_step(ask, hold):
     hold(orders.sliding(ask), "good")
 
 
+def test_rest_converges_with_the_first_order_of_the_step(ask, hold):
+    hold(orders.resting(ask), "excellent")
+
+
 def test_an_error_that_does_not_fall_has_no_order():
     found = orders.order("", "", np.array([1.0, 0.5, 0.25]), [1.0, 0.2, 0.3], orders.SMOOTH)
     assert found.level == "-"

@@ -1,9 +1,46 @@
 """A9: nothing is felt of the facets below a block that slides."""
 
+import numpy as np
 import pytest
-from verification import facets
+import warp as wp
+from verification import facets, unweighted
 
 
 @pytest.mark.parametrize("ratio", facets.RATIOS)
 def test_a_block_slides_over_facets_without_feeling_them(ratio, ask, hold):
     hold(facets.drag(ask, ratio, fixed=True), "excellent")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ratio", facets.RATIOS)
+def test_without_weights_the_force_jumps_while_a_block_slides(ratio, ask):
+    found = list(facets.compare(ask, ratio))
+    print(*found, sep="\n")
+    ripple = [f for f in found if f.name.startswith("ripple of the normal")]
+    on, off = ripple[0], ripple[1:]
+    assert on.level in ("best", "excellent")
+    assert [f.case.split(", ")[1] for f in off] == list(unweighted.OFF)
+    # Measured 7 to 44 times; half of the least leaves room for another order of rounding.
+    assert all(f.value > 3.0 * on.value for f in off)
+    jump = [f.value for f in found if f.name.startswith("largest jump")]
+    # The whole force of a contact against what it shifts in a frame.
+    assert min(jump[1:]) > 2.0 * jump[0]
+
+
+@pytest.mark.parametrize("how", unweighted.OFF)
+def test_weights_are_switched_off_for_vertices_on_bodies_and_on_again_after(how):
+    coef = [[1.0, 0.0, -0.2, -0.5, -0.3], [1.0, 0.0, 0.0, 0.0, 0.0], [0.0] * 5]
+    out = wp.array(coef, dtype=float)
+    pair = wp.array([[0, 1], [0, 2], [0, 1]], dtype=wp.vec2i)  # the second is on a plane
+    count = wp.array([3], dtype=int)
+    wp.launch(
+        unweighted.level, 3, inputs=[how == unweighted.CLOSEST, 2, count, pair], outputs=[out]
+    )
+    third = 1.0 / 3.0
+    first = [0.0, -1.0, 0.0] if how == unweighted.CLOSEST else [-third] * 3
+    np.testing.assert_allclose(out.numpy(), [[1.0, 0.0, *first], *coef[1:]], rtol=1e-6)
+
+    before = unweighted.depth.vertex_contacts
+    with unweighted.switched_off(how):
+        assert unweighted.depth.vertex_contacts is not before
+    assert unweighted.depth.vertex_contacts is before

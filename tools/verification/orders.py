@@ -3,24 +3,29 @@
     bar on a wall, h and dt together     1 - e, 1 - energy   0.70, 1.0 for symplectic Euler with
                                                              projection, 0.50 for implicit Euler
     block that slides down a slope, dt   place               1, that of symplectic Euler
+    bar that rests and trembles, dt      state               1
     Hertz, elements across the contact   pressure, L2        0.5 to 1.0 with linear elements
+                                         displacement, L2    2 with linear elements
 
-The last are the orders of linear and quadratic elements against a curved master surface (code_aster
-V6.03.150); linear triangles with an exact active set have 0.7 to 0.8 in plane strain.
+Those of Hertz are the orders of linear and quadratic elements against a curved master surface
+(code_aster V6.03.150). Linear triangles with an exact active set in plane strain have 0.7 to 0.8
+for the pressure.
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
 import warp_contact as wc
-from verification import bars, friction, hertz
+from verification import bars, cylinder, friction, hertz
 from verification.figure import Figure
-from verification.setup import Ask, Pose
+from verification.relax import relax, step_rate
+from verification.setup import Ask, G, Pose
 
 ELEMENTS = 10, 20, 40, 80  # along the bar
-# Of the sliding block. The first is about the stable step; finer ones differ by less than
-# the block trembles, 2e-5 m.
+# Of the sliding block and the resting bar. The first is about the stable step; finer ones differ
+# by less than they tremble, 2e-5 m.
 FPS, SUBSTEPS = 240, (8, 16, 32)
 MU, START, SLIDES = 0.25, 1.0, 0.5  # friction on the slope of 1/2, speed [m/s], duration [s]
 
@@ -28,14 +33,22 @@ MU, START, SLIDES = 0.25, 1.0, 0.5  # friction on the slope of 1/2, speed [m/s],
 IMPACT = 1.0, (0.55, 0.3, 0.0)
 SMOOTH = 1.0, (0.1, 0.05, 0.01)
 PRESSURE = 1.0, (0.6, 0.2, 0.0)
+SHAPE = 2.0, (1.0, 0.2, 0.0)
+
+REST, LAYERS = bars.Bar(1.0, 1e5, 1000.0, 0.0), 10  # the bar that rests, its cells
+ON_PLANE = 5.0 * REST.young * REST.length / LAYERS  # of a penalty [N/m]
+DIP, WAIT = 0.3, 10  # start, of the weight; until [frames]: L / c, a quarter of a period
+RINGS = 4, 8, 16  # of nested meshes, 1, 2 and 4 elements across the contact
 
 
 def run(ask: Ask) -> Iterator[Figure]:
-    """Impact, sliding and Hertz; the quick run leaves out the finest of each."""
+    """Impact, sliding, resting, Hertz; the quick run leaves out what is finest."""
     last = -1 if ask.quick else None
     yield from impact(ask, ELEMENTS[:last])
     yield from sliding(ask)
+    yield from resting(ask)
     yield from pressure(ask, hertz.COUNTS[:last])
+    yield from shape(ask, 0.5 if ask.quick else 1.0)
 
 
 def order(label: str, name: str, sizes, errors, target: tuple[float, tuple]) -> Figure:
@@ -78,13 +91,73 @@ def sliding(ask: Ask) -> Iterator[Figure]:
 
 
 def pressure(ask: Ask, counts) -> Iterator[Figure]:
-    """L2 error of the pressure below a sphere."""
-    e_star = hertz.modulus(hertz.YOUNG)
-    a = hertz.contact_radius(hertz.LOADS[1], hertz.RADIUS, e_star)
-    errors = []
-    for n in counts:
-        sim, p = hertz.press(ask, n, a**2 / hertz.RADIUS, a, Pose())
-        found = hertz.profile("", sim, p, hertz.RADIUS, e_star, n, Pose())
-        errors.append(next((f.value for f in found if f.name == "pressure, L2 error"), np.nan))
-    label = f"A8 sphere on plane, N = {', '.join(map(str, counts))}"
-    yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)
+    """L2 error of the pressure below a sphere and a cylinder."""
+    for body, case in (("sphere", hertz), ("cylinder", cylinder)):
+        errors = []
+        for n in counts:
+            found = case.on_plane(ask, n, Pose())
+            errors.append(next((f.value for f in found if f.name == hertz.OVERALL), np.nan))
+        label = f"A8 {body} on plane, N = {', '.join(map(str, counts))}"
+        yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)
+
+
+def resting(ask: Ask) -> Iterator[Figure]:
+    """State of a bar that trembles about its settlement on a plane and never leaves it.
+
+    It starts at rest with a part of its weight; velocities count by length over wave speed.
+    """
+    at_rest = settled(ask, DIP).positions()
+    rate = 10.0 * REST.c / REST.length
+    states = []
+    for n in SUBSTEPS:
+        sim = wc.Simulation(standing(1.0), ask.respond(ON_PLANE), rate, substeps=n)
+        sim.state.x.assign(at_rest)
+        for _ in sim.frames(WAIT):
+            pass
+        v = sim.velocities() * REST.length / REST.c
+        states.append(np.concatenate([sim.positions(), v]).astype(float))
+    errors = [np.linalg.norm(b - a) for a, b in pairwise(states)]
+    label = f"A8 resting bar, {', '.join(map(str, SUBSTEPS))} steps a frame"
+    sizes = 1.0 / np.array(SUBSTEPS[:-1])
+    yield order(label, "order of the state in dt", sizes, errors, SMOOTH)
+
+
+def standing(part: float) -> wc.Scene:
+    """The bar on a plane under a part of gravity."""
+    scene = wc.Scene(gravity=(0.0, 0.0, -part * G), friction=0.0)
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    width = REST.length / LAYERS
+    mesh = wc.box((width, width, REST.length), (1, 1, LAYERS))
+    scene.add_body(mesh, wc.Corotated(REST.young, 0.0, REST.density), (0, 0, 0.5 * REST.length))
+    return scene
+
+
+def settled(ask: Ask, part: float) -> wc.Simulation:
+    """The bar at rest under a part of gravity."""
+    fps = step_rate(REST.length / LAYERS, REST.c)
+    sim = wc.Simulation(standing(part), ask.respond(ON_PLANE), fps)
+    omega = 0.5 * np.pi * REST.c / REST.length
+    for _ in relax(sim, omega, round(14.0 / omega * fps)):
+        pass
+    return sim
+
+
+def shape(ask: Ask, across: float) -> Iterator[Figure]:
+    """L2 norm of the displacement below a sphere; differences of successive, nested meshes.
+
+    ``across`` elements are in the contact of the first.
+    """
+    a = hertz.contact_radius(hertz.LOADS[1], hertz.RADIUS, hertz.modulus(hertz.YOUNG))
+    found = []
+    for rings in RINGS:
+        n = across * rings / RINGS[0]
+        sim, _ = hertz.press(ask, n, a**2 / hertz.RADIUS, a, Pose(), rings)
+        rest = sim.scene.bodies[0].x
+        if not found:
+            first, weight = rest, sim.model.mass.numpy().astype(float)
+        apart = np.linalg.norm(first[:, None] - rest, axis=2)
+        at = apart.argmin(axis=1)
+        found.append((sim.positions().astype(float) - rest)[at])
+    errors = [np.sqrt(weight @ ((v - u) ** 2).sum(axis=1)) for u, v in pairwise(found)]
+    label = f"A8 sphere on plane, {', '.join(map(str, RINGS))} rings"
+    yield order(label, "order of the displacement, L2", 1.0 / np.array(RINGS[:-1]), errors, SHAPE)

@@ -1,7 +1,8 @@
-"""tools/pareto.py: who dominates whom, and the rail of failures."""
+"""tools/pareto.py: who dominates whom, the rail of failures, the distance of surfaces."""
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 TOOLS = str(Path(__file__).resolve().parent.parent / "tools")
@@ -130,3 +131,105 @@ def test_words_and_picture_keep_every_failure(tmp_path):
         "absent x1: not installed",
     }
     pyplot.close(figure)
+
+
+def distance(xa, xb) -> float:
+    """Of two surfaces of one triangle each."""
+    from charting.distance import distance
+
+    tri = np.array([[0, 1, 2]])
+    return distance(np.array(xa), tri, np.array(xb), tri)
+
+
+FLAT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+PAIRS = {  # second triangle, distance from FLAT
+    "a vertex above the inside": ([[0.2, 0.2, 0.3], [0.2, 1.0, 2.0], [1.0, 0.2, 2.0]], 0.3),
+    "a vertex beside an edge": ([[0.5, -0.4, 0.0], [0.5, -2.0, 1.0], [0.6, -2.0, -1.0]], 0.4),
+    "edges that pass each other": ([[0.5, -1.0, -0.9], [0.5, -1.0, 1.1], [0.5, -2.0, 0.0]], 1.0),
+    "a crossed one above": ([[0.5, -0.5, 0.2], [0.5, 0.5, 0.2], [0.5, 0.0, 2.0]], 0.2),
+    "parallel edges": ([[0.2, -0.3, 0.0], [0.8, -0.3, 0.0], [0.5, -1.0, 1.0]], 0.3),
+    "one that goes through": ([[0.2, 0.2, 0.3], [0.2, 0.2, -0.3], [0.9, 0.9, 0.3]], 0.0),
+    "one apart in its own plane": ([[3.0, 0.0, 0.0], [4.0, 0.0, 0.0], [3.0, 1.0, 0.0]], 2.0),
+}
+
+
+@pytest.mark.parametrize("case", PAIRS)
+def test_the_distance_of_two_triangles(case):
+    other, exact = PAIRS[case]
+    # Double precision on coordinates of order 1.
+    assert distance(FLAT, other) == pytest.approx(exact, abs=1e-14)
+    assert distance(other, FLAT) == pytest.approx(exact, abs=1e-14)
+
+
+def test_the_distance_of_triangles_is_that_of_their_points(rng):
+    weights = np.array([(i, j, 40 - i - j) for i in range(41) for j in range(41 - i)]) / 40.0
+    for _ in range(20):
+        a, b = rng.uniform(-1.0, 1.0, (2, 3, 3))
+        sampled = np.linalg.norm((weights @ a)[:, None] - weights @ b, axis=2).min()
+        exact = distance(a, b)
+        # Each of the two nearest points has one of the samples within a cell, an edge over 40; no
+        # edge is longer than the diagonal of the cube that they are drawn from.
+        assert exact <= sampled + 1e-14
+        assert exact >= sampled - 2.0 * np.sqrt(12.0) / 40.0
+
+
+def held(heights) -> tuple:
+    """The squeezed sphere with its upper cube at so many edges over the sphere, frame by frame."""
+    from charting import panel as parts
+    from charting import paper
+    from charting.panel import Motion
+
+    panel = paper.scene("squeezed_sphere", True)
+    scene = panel.scene()
+    x = np.concatenate([body.x for body in scene.bodies])
+    x[parts.part(scene, 1), 2] -= distance_of(scene, 0, 1)
+    unit = min(paper.edge(scene.bodies[k].mesh) for k in (1, 2))
+    frames = np.repeat(x[None], panel.frames + 1, axis=0)
+    top = parts.part(scene, 2)
+    frames[:, top, 2] -= frames[0, top, 2].min() - frames[0, parts.part(scene, 1), 2].max()
+    frames[:, top, 2] += unit * np.broadcast_to(heights, panel.frames + 1)[:, None]
+    return panel, Motion(frames, np.zeros_like(frames), "neo-hookean", 1.0, 0.0, 1)
+
+
+def distance_of(scene, *pair) -> float:
+    from charting.distance import distance
+
+    one, two = (scene.bodies[k] for k in pair)
+    return distance(one.x, one.mesh.surface, two.x, two.mesh.surface)
+
+
+def test_a_margin_is_an_error_like_an_overlap():
+    for height in (0.1, -0.02):
+        panel, motion = held(height)
+        # Overlaps are measured in float32, on coordinates of ten edges.
+        assert panel.error(panel, motion) == pytest.approx(abs(height), abs=1e-5)
+        (overlap,) = panel.also
+        assert overlap.error(overlap, motion) == pytest.approx(max(-height, 0.0), abs=1e-5)
+
+
+def test_bodies_that_went_through_each_other_are_a_failure():
+    from charting.panel import Failed
+
+    panel, motion = held(1.1)
+    for shown in (panel, *panel.also):
+        with pytest.raises(Failed, match=r"apart \(1\.1 edges\)"):
+            shown.error(shown, motion)
+
+
+def test_a_hop_is_no_gap_and_one_that_stays_is():
+    hop = np.zeros(31)
+    hop[-3:] = 0.1
+    panel, motion = held(hop)
+    # Rounding of coordinates of 0.3 m; overlaps are measured in float32.
+    assert panel.error(panel, motion) == pytest.approx(0.0, abs=1e-5)
+    hop[-6:] = 0.1
+    panel, motion = held(hop)
+    assert panel.error(panel, motion) == pytest.approx(0.1, abs=1e-5)
+
+
+def test_every_pair_that_presses_is_in_its_scene():
+    from charting import paper
+
+    for name, pairs in paper.PRESSED.items():
+        labels = {body.label for body in paper.scene(name, True).scene().bodies}
+        assert {label for pair in pairs for label in pair} == labels

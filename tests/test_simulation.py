@@ -13,6 +13,7 @@ from warp_contact import (
     SimulationError,
     TetMesh,
     box,
+    simulation,
     sphere,
 )
 
@@ -155,6 +156,26 @@ def test_a_nan_stops_the_run_and_names_frame_and_body():
     sim.state.x.assign(before)
     sim.step_frame()
     assert sim.frame == 3 and np.isfinite(sim.positions()).all()
+
+
+def test_a_frame_that_blows_up_is_tried_again_with_shorter_steps(monkeypatch):
+    mesh = box(0.1, 3)
+    z = mesh.vertices[:, 2]
+    top, low = np.flatnonzero(z > 0.049), np.flatnonzero(z < -0.049)
+
+    def pull() -> Simulation:  # to three lengths in one frame, stiffer than its start tells
+        scene = Scene(gravity=(0.0, 0.0, 0.0))
+        body = scene.add_body(mesh, NeoHookean(1e6, 0.45, 1000.0), fixed=np.r_[top, low])
+        sim = Simulation(scene, fps=1)
+        sim.set_velocity(body, (0.0, 0.0, 0.2), top)
+        sim.step_frame()
+        return sim
+
+    sim = pull()
+    assert np.isfinite(sim.positions()).all() and sim.measure().volume_ratio > 0.0
+    monkeypatch.setattr(simulation, "HALVED", 0)
+    with pytest.raises(SimulationError, match=r"body0', vertex \d+ is no longer"):
+        pull()
 
 
 def test_set_velocity_moves_pinned_vertices_and_leaves_them_to_nothing_else():

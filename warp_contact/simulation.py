@@ -29,6 +29,7 @@ KEEP = (
     0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
 )
 UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
+HALVED = 3  # times that the steps of a frame are halved because its state did not stay finite
 ATTEMPTS = 12  # at a frame, with larger buffers or shorter steps each time
 
 
@@ -130,12 +131,20 @@ class Simulation:
                 self._search = solver.overlaps(self.model, self.state, self._work)
             omega, rate = self._rates or self._spectra()
             fewest = int(KEEP * self.substeps)
+            halved = 0
             for _attempt in range(ATTEMPTS):
                 dt = self._run(omega, rate, fewest)
                 if self._grow():
                     self._restore()
                     continue
-                self._check_finite()
+                lost = self._lost_vertex()
+                if lost is not None:
+                    self._restore()
+                    if self._wanted or halved == HALVED or self._lost_vertex() is not None:
+                        raise self._no_longer_finite(lost)
+                    halved += 1
+                    omega, rate = 2.0 * omega, 2.0 * rate
+                    continue
                 after = self._spectra()
                 limit = UNSTABLE_DAMPED if rate > 0.0 else UNSTABLE
                 steady = self._wanted is not None or dt * after[0] <= limit
@@ -274,17 +283,18 @@ class Simulation:
         """Largest frequency of the elastic forces and largest damping rate, at the state [1/s]."""
         return self._spectrum.omega(self.state.x), self._spectrum.damping_rate(self.state.x)
 
-    def _check_finite(self) -> None:
+    def _lost_vertex(self) -> int | None:
+        """The first vertex whose state is not finite."""
         finite = np.isfinite(self.state.x.numpy()).all(1) & np.isfinite(self.state.v.numpy()).all(1)
-        if not finite.all():
-            vertex = int((~finite).argmax())
-            body = int(self.model.vert_body.numpy()[vertex])
-            vertex -= int(self.model.body_vert.numpy()[body])
-            self._restore()
-            raise SimulationError(
-                f"frame {self.frame + 1}: body '{self.model.labels[body]}', vertex {vertex} is no "
-                f"longer finite ({self.substeps} substeps)"
-            )
+        return None if finite.all() else int((~finite).argmax())
+
+    def _no_longer_finite(self, vertex: int) -> SimulationError:
+        body = int(self.model.vert_body.numpy()[vertex])
+        vertex -= int(self.model.body_vert.numpy()[body])
+        return SimulationError(
+            f"frame {self.frame + 1}: body '{self.model.labels[body]}', vertex {vertex} is no "
+            f"longer finite ({self.substeps} substeps)"
+        )
 
     def _range(self, body: Body | int | None) -> slice:
         if body is None:

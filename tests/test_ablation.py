@@ -6,28 +6,31 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
+import warp as wp
 
-from warp_contact import candidates, depth, impulse, simulation, solver, surface
+from warp_contact import candidates, depth, impulse, solver, substeps, surface
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
 import ablation
+from ablating.off import without
+from ablating.parts import FINEST, PARTS, Part
 
-OWNERS = candidates, depth, impulse, simulation, solver, surface
+OWNERS = candidates, depth, impulse, solver, substeps, surface
 
 
 @pytest.fixture
 def part():
     """A part of which a figure depends on ``surface.BOUND``: ``part(with, without, least)``."""
 
-    def make(kept: float, off: float, least: float = 0.0) -> ablation.Part:
+    def make(kept: float, off: float, least: float = 0.0) -> Part:
         bound = surface.BOUND
 
         def case() -> dict[str, float]:
             """A number."""
             return {"figure": kept if surface.BOUND == bound else off}
 
-        return ablation.Part("name", ablation.without(surface, "BOUND", 1.0), case, "figure", least)
+        return Part("name", without(surface, "BOUND", 1.0), case, "figure", least)
 
     return make
 
@@ -53,9 +56,9 @@ def test_a_run_that_stops_early_is_worse_than_any(part):
     from warp_contact import SimulationError
 
     with mock.patch.object(ablation, "figures", lambda case: {"figure": 1.0}):
-        stops = ablation.Part(
+        stops = Part(
             "name",
-            ablation.without(surface, "BOUND", 1.0),
+            without(surface, "BOUND", 1.0),
             mock.Mock(side_effect=SimulationError("not finite")),
             "figure",
             0.0,
@@ -75,19 +78,19 @@ def test_the_exit_status_tells_of_a_part_that_nothing_misses(part, monkeypatch, 
 
 def test_every_part_changes_something_and_is_back_afterwards():
     before = [dict(vars(owner)) for owner in OWNERS]
-    launch = ablation.wp.launch
-    for part in ablation.PARTS.values():
+    launch = wp.launch
+    for part in PARTS.values():
         with part.off():
             changed = [dict(vars(owner)) for owner in OWNERS] != before
-            assert changed or ablation.wp.launch is not launch, part.name
+            assert changed or wp.launch is not launch, part.name
         assert [dict(vars(owner)) for owner in OWNERS] == before
-        assert ablation.wp.launch is launch
+        assert wp.launch is launch
 
 
 def test_tilted_blocks_need_contacts_of_edges():
-    line = ablation.compare(ablation.PARTS["edges"])
+    line = ablation.compare(PARTS["edges"])
     # What the closure leaves, twice: it may stop there at both ends of a contact.
-    assert line.kept < 2.0 * ablation.FINEST
+    assert line.kept < 2.0 * FINEST
     # Without edges nothing keeps a corner out; it goes in by 5 % of an edge, and rounding in a
     # collision moves that by far less than the factor of 5 that is left here.
     assert line.off > 1.0

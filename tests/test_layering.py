@@ -15,7 +15,7 @@ LADDER = (  # a module imports from lower rungs only
     {"topology", "errors", "progress", "response", "types", "usd_scene", "materials"},
     {"mesh", "work", "forces", "usd"},
     {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"},
-    {"assemble", "detect", "surface", "render", "scenes"},
+    {"assemble", "detect", "surface", "render", "scenes", "substeps"},
     {"solver"},
     {"simulation"},
     {"__init__", "commands"},

@@ -10,24 +10,23 @@ import warp as wp
 from warp_contact import solver
 from warp_contact.assemble import assemble
 from warp_contact.errors import SimulationError
-from warp_contact.forces import MARGIN, stages_for
+from warp_contact.forces import stages_for
 from warp_contact.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.scene import Body, Scene
 from warp_contact.spectrum import Spectrum
+from warp_contact.substeps import (
+    raised,
+    stays_damped,
+    stays_stable,
+    steps_in_frame,
+    steps_per_second,
+    with_penalty,
+)
 from warp_contact.types import Capacity, State
 from warp_contact.work import Work, allocate_work
 
-SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
-UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
-UNSTABLE_DAMPED = 1.4  # the same with damping, see kernels/motion.py
-REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
-TRAVEL = 0.025  # of the shortest mean edge: the same, for an impact without a trace of overlap
-PATIENCE = 2.0  # stable steps, at most, that such an impact is worth
-KEEP = (
-    0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
-)
 UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
 HALVED = 3  # times that the steps of a frame are halved because its state did not stay finite
 ATTEMPTS = 12  # at a frame, with larger buffers or shorter steps each time
@@ -130,10 +129,9 @@ class Simulation:
             while self._search is None or self._grow():
                 self._search = solver.overlaps(self.model, self.state, self._work)
             omega, rate = self._rates or self._spectra()
-            fewest = int(KEEP * self.substeps)
-            halved = 0
+            last, halved = self.substeps, 0
             for _attempt in range(ATTEMPTS):
-                dt = self._run(omega, rate, fewest)
+                dt = self._run(omega, rate, last)
                 if self._grow():
                     self._restore()
                     continue
@@ -146,11 +144,10 @@ class Simulation:
                     omega, rate = 2.0 * omega, 2.0 * rate
                     continue
                 after = self._spectra()
-                limit = UNSTABLE_DAMPED if rate > 0.0 else UNSTABLE
-                steady = self._wanted is not None or dt * after[0] <= limit
-                if steady and stages_for(after[1] / MARGIN, dt) <= stages_for(rate, dt):
+                stable = self._wanted is not None or stays_stable(dt, after[0], rate > 0.0)
+                if stable and stays_damped(dt, rate, after[1]):
                     break
-                omega, rate = max(1.2 * omega, after[0]), max(rate, after[1])
+                omega, rate = raised((omega, rate), after)
                 self._restore()
             else:
                 raise SimulationError(
@@ -217,10 +214,10 @@ class Simulation:
             "partner": partner,
         }
 
-    def _run(self, omega: float, rate: float, fewest: int) -> float:
-        """Step one frame at the rates [1/s] given; return the step [s]."""
+    def _run(self, omega: float, rate: float, last: int) -> float:
+        """Step one frame at the rates [1/s] given, after ``last`` steps; return the step [s]."""
         work = self._work
-        n = self._wanted or max(fewest, self._substeps(omega))
+        n = self._wanted or steps_in_frame(self._steps_per_second(omega), self.fps, last)
         dt = 1.0 / (self.fps * n)
         stages = stages_for(rate, dt)
         if self._dt is not None and dt != self._dt:
@@ -239,20 +236,16 @@ class Simulation:
         self.substeps = n
         return dt
 
-    def _substeps(self, omega: float) -> int:
-        """Equal steps in a frame: stable, and short against the thinnest body."""
+    def _steps_per_second(self, omega: float) -> float:
+        """Steps [1/s] at the frequency [1/s] and the state given, see ``substeps``."""
         if isinstance(self.response, Penalty):
-            omega = math.sqrt(omega**2 + 4.0 * self.response.stiffness * self._largest_inv_mass)
+            omega = with_penalty(omega, self.response.stiffness, self._largest_inv_mass)
+        if not math.isfinite(omega):
+            raise SimulationError(f"frame {self.frame + 1}: {self._flattest()}: no step is stable")
         v = self.state.v.numpy()
         speed = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0)))
         speed += float(np.linalg.norm(self.model.gravity)) / self.fps
-        if not math.isfinite(omega):
-            raise SimulationError(f"frame {self.frame + 1}: {self._flattest()}: no step is stable")
-        stable = omega / (2.0 * SAFETY)
-        passing = speed / (REACH * self._thickness)
-        clean = min(speed / (TRAVEL * self._edge), PATIENCE * stable)
-        wanted = math.ceil(max(stable, passing, clean) / self.fps)
-        return max(1, wanted)
+        return steps_per_second(omega, speed, self._thickness, self._edge)
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured steps of a frame, with so many stages of damping."""

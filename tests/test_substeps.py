@@ -1,0 +1,65 @@
+"""substeps.py: the number of steps in a frame, and what makes a frame be repeated."""
+
+import math
+
+import numpy as np
+import pytest
+
+from warp_contact import substeps
+from warp_contact.forces import MARGIN
+
+OMEGA = 1000.0  # [1/s]
+STABLE = OMEGA / (2.0 * substeps.SAFETY)  # steps [1/s] of a body that does not move
+THICKNESS, EDGE = 0.1, 0.02  # [m]
+
+
+def steps(speed: float, thickness: float = THICKNESS) -> float:
+    return substeps.steps_per_second(OMEGA, speed, thickness, EDGE)
+
+
+def test_each_limit_sets_the_steps_where_it_is_the_tightest():
+    assert steps(0.0) == STABLE
+    travel = substeps.TRAVEL * EDGE
+    assert steps(1.5 * STABLE * travel) == pytest.approx(1.5 * STABLE)
+    fast = 10.0 * STABLE * travel
+    assert steps(fast) == substeps.PATIENCE * STABLE
+    assert steps(fast, thickness=1e-4) == pytest.approx(fast / (substeps.REACH * 1e-4))
+
+
+def test_more_speed_never_takes_fewer_steps():
+    wanted = [steps(0.01 * 2.0**k) for k in range(20)]
+    assert wanted == sorted(wanted)
+    assert steps(0.02 * 2.0**20) == pytest.approx(2.0 * steps(0.01 * 2.0**20))
+
+
+def test_a_frame_has_a_step_and_hardly_fewer_than_the_last():
+    assert substeps.steps_in_frame(0.0, 60.0, 0) == 1
+    assert substeps.steps_in_frame(601.0, 60.0, 0) == 11
+    assert substeps.steps_in_frame(601.0, 60.0, 100) == int(100 * substeps.KEEP)
+    assert substeps.steps_in_frame(60.0 * 200, 60.0, 100) == 200
+
+
+def test_a_penalty_adds_the_highest_frequency_of_masses_that_it_joins_in_a_row():
+    stiffness, mass = 500.0, 1e-3
+    shift = np.roll(np.eye(8), 1, axis=0)
+    ring = stiffness / mass * (2.0 * np.eye(8) - shift - shift.T)
+    highest = math.sqrt(np.linalg.eigvalsh(ring)[-1])
+    assert substeps.with_penalty(0.0, stiffness, 1.0 / mass) == pytest.approx(highest)
+    assert substeps.with_penalty(OMEGA, stiffness, 0.0) == OMEGA
+
+
+@pytest.mark.parametrize(("damped", "exact"), [(False, 2.0), (True, math.sqrt(2.0))])
+def test_a_step_is_refused_before_it_is_unstable(damped, exact):
+    # Euler needs (h omega)^2 < 2 (1 + p); p is 1 without damping and near 0 with much of it.
+    assert not substeps.stays_stable(0.9999 * exact / OMEGA, OMEGA, damped)
+    assert substeps.stays_stable(0.97 * exact / OMEGA, OMEGA, damped)
+    assert not substeps.stays_stable(1e-6, math.inf, damped)
+    assert not substeps.stays_stable(1e-6, math.nan, damped)
+
+
+def test_a_frame_keeps_its_stages_until_the_margin_of_the_damping_is_used_up():
+    dt = 1e-3
+    rate = 3.0 / (MARGIN * dt)  # two stages are stable up to 3, see forces.damp
+    assert substeps.stays_damped(dt, 0.999 * rate, 0.999 * MARGIN * rate)
+    assert not substeps.stays_damped(dt, 0.999 * rate, 1.001 * MARGIN * rate)
+    assert substeps.stays_damped(dt, 0.0, 0.0)

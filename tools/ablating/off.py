@@ -1,0 +1,80 @@
+"""How a part of the package is switched off, from outside."""
+
+import math
+from collections.abc import Callable
+from unittest import mock
+
+import warp as wp
+
+from warp_contact import candidates, depth, forces, impulse, solver, substeps, surface
+from warp_contact.kernels import impulse as impulse_kernels
+
+
+def without(owner, attribute: str, new) -> Callable:
+    """A context maker that puts ``new`` in the place of a function or constant of the package."""
+    getattr(owner, attribute)
+    return lambda: mock.patch.object(owner, attribute, new)
+
+
+def without_repeats():
+    """A context in which the stable step of the start of a frame is that of its end too."""
+    return mock.patch.multiple(substeps, UNSTABLE=math.inf, UNSTABLE_DAMPED=math.inf)
+
+
+def nothing(*args) -> None:
+    """In the place of a stage."""
+
+
+def no_crossings(model, x0, x, work, fresh) -> None:
+    """In the place of ``solver.edge_contacts``."""
+    work.n_crossing.zero_()
+
+
+def by_mass(model, state, work, response, search, move=solver.move_surfaces) -> None:
+    """In the place of ``solver.move_surfaces``: deep overlaps are left to the closure too."""
+    move(model, state, work, response, False)
+
+
+def unseen(model, state, work, response, search, move=solver.move_surfaces) -> None:
+    """In the place of ``solver.move_surfaces``: after the closure it looks at edges alone."""
+    with mock.patch.object(solver, "vertex_contacts", nothing):
+        move(model, state, work, response, search)
+
+
+def border_only(model, x, work, find=depth.hit_depths) -> None:
+    """In the place of ``depth.hit_depths``: no layer behind the border."""
+    with mock.patch.object(wp, "capture_while", nothing):
+        find(model, x, work)
+
+
+def without_couple(model, x, v, work, search, close=surface.close) -> None:
+    """In the place of ``surface.close``: what it hands back to ``v`` goes to a scratch array."""
+    close(model, x, work.v, work, search)
+
+
+def straight(model, x0, work, first, begin=impulse.begin) -> None:
+    """In the place of ``impulse.begin``: friction acts across gaps as if they were closed."""
+    begin(model, x0, work, first)
+    work.contacts.open.zero_()
+
+
+def plain(kernel, *args, launch=wp.launch, **kwargs) -> None:
+    """In the place of ``wp.launch``: every sweep of the impulses is a plain one, like the last."""
+    if kernel is impulse_kernels.solve_contacts:
+        kwargs["inputs"] = [*kwargs["inputs"][:-1], True]
+    launch(kernel, *args, **kwargs)
+
+
+def damp_last(model, state, work, stages) -> None:
+    """In the place of ``solver.predict``: the forces first."""
+    solver.kick(model, state, work)
+    if stages > 0:
+        scratch = work.v, work.s
+        forces.damp(model, state.x, state.v, work.dt, work.f_tet, scratch, stages)
+    solver.drift(model, state, work, work.x)
+
+
+def found_anew(model, x0, x1, work, refresh=candidates.refresh) -> None:
+    """In the place of ``candidates.refresh``: all that was found is out of date."""
+    work.candidates.x.fill_(wp.vec3(math.inf))
+    refresh(model, x0, x1, work)

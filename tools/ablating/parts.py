@@ -1,0 +1,148 @@
+"""The parts of the default method, each with the case that needs it."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import warp as wp
+
+from ablating import apart, impacts, loads, off
+from ablating.off import without
+from warp_contact import candidates, depth, impulse, solver, substeps, surface
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is switched off, and who misses it.
+
+    Attributes:
+        name: of the part
+        off: a context in which it is off
+        case: a function that returns figures by name
+        figure: of that case
+        least: what the figure is known to, from rounding or from chance
+    """
+
+    name: str
+    off: Callable
+    case: Callable[[], dict[str, float]]
+    figure: str
+    least: float
+
+
+FINEST = 100.0 * surface.TOLERANCE  # % of an edge: an overlap that is left on purpose
+ROUNDED = 1e-6  # of the angular momentum: a walk of float32 over a thousand steps
+FORCE = 1e-5  # of a force: float32, and a sample of some frames
+PARTS = {
+    "edges": Part(
+        "contacts of edges",
+        without(solver, "edge_contacts", off.no_crossings),
+        impacts.tilted,
+        impacts.OVERLAP,
+        FINEST,
+    ),
+    "layers": Part(
+        "depth behind the border (stage 2)",
+        without(depth, "hit_depths", off.border_only),
+        loads.deep,
+        loads.INSERTED,
+        1e-3,
+    ),
+    "search": Part(
+        "search for the surface (stage 4)",
+        without(solver, "move_surfaces", off.by_mass),
+        loads.overlapping,
+        loads.PLACE,
+        1.0,
+    ),
+    "bound": Part(
+        "bound of a move in stage 4",
+        without(surface, "BOUND", math.inf),
+        loads.deep,
+        loads.INSERTED,
+        1e-3,
+    ),
+    "closure": Part(
+        "closure", without(surface, "close", off.nothing), impacts.tilted, impacts.OVERLAP, FINEST
+    ),
+    "looks": Part(
+        "looks after the closure",
+        without(solver, "LOOKS", 0),
+        impacts.hard,
+        impacts.OVERLAP,
+        FINEST,
+    ),
+    "vertices": Part(
+        "of these, the look at vertices",
+        without(solver, "move_surfaces", off.unseen),
+        impacts.hard,
+        impacts.OVERLAP,
+        FINEST,
+    ),
+    "couple": Part(
+        "couple of the closure",
+        without(surface, "close", off.without_couple),
+        impacts.tilted,
+        impacts.SPIN,
+        ROUNDED,
+    ),
+    "friction": Part(
+        "couple of friction across a gap",
+        without(impulse, "begin", off.straight),
+        impacts.oblique,
+        impacts.SPIN,
+        ROUNDED,
+    ),
+    "warm": Part(
+        "start from the last impulses",
+        without(impulse, "recall", off.nothing),
+        loads.sheet,
+        loads.SWEEPS,
+        1.0,
+    ),
+    "ahead": Part(
+        "extrapolation of the sweeps",
+        without(wp, "launch", off.plain),
+        loads.stacked,
+        loads.CARRIED,
+        FORCE,
+    ),
+    "damping": Part(
+        "damping before the forces",
+        without(solver, "predict", off.damp_last),
+        loads.columns,
+        loads.PRESSED,
+        FORCE,
+    ),
+    "skins": Part(
+        "candidates kept for many steps",
+        without(candidates, "refresh", off.found_anew),
+        apart.crowd,
+        apart.TIME,
+        0.0,
+    ),
+    "impact": Part(
+        "shorter steps at an impact",
+        without(substeps, "TRAVEL", math.inf),
+        impacts.soft,
+        impacts.OVERLAP,
+        FINEST,
+    ),
+    "thin": Part(
+        "shorter steps for thin bodies",
+        without(substeps, "REACH", math.inf),
+        impacts.thin,
+        impacts.APPROACH,
+        0.01,
+    ),
+    "repeats": Part(
+        "frames repeated in shorter steps", off.without_repeats, apart.pulled, apart.FLATTENED, 1.0
+    ),
+    "steady": Part(
+        "steps that hardly grow again",
+        without(substeps, "KEEP", 0.0),
+        apart.vibrating,
+        apart.DRIFT,
+        1e-3,
+    ),
+}

@@ -1,0 +1,67 @@
+"""How many equal steps a frame takes, and whether they proved enough.
+
+    stable  = omega / (2 SAFETY)                     [1/s]  2 / omega is the longest stable step
+    passing = u / (REACH t)                          [1/s]  nothing jumps through a body
+    clean   = min(u / (TRAVEL e), PATIENCE stable)   [1/s]  an impact without a trace of overlap
+    n       = max(ceil(max(stable, passing, clean) / fps), floor(KEEP n_last), 1)
+
+omega is the largest frequency of the elastic forces [1/s], u the largest relative speed [m/s], t
+the thickness of the thinnest body [m] and e the shortest mean edge of a body [m]. They are those at
+the start of the frame. At its end the step must still be below ``UNSTABLE`` / omega, and damped in
+as many stages as it then needs; a frame that fails is repeated at the rates of its end.
+"""
+
+import math
+
+from warp_contact.forces import MARGIN, stages_for
+
+SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
+UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
+UNSTABLE_DAMPED = 1.4  # the same with damping, see kernels/motion.py
+RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
+REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
+TRAVEL = 0.025  # of the shortest mean edge: the same, for an impact without a trace of overlap
+PATIENCE = 2.0  # stable steps, at most, that such an impact is worth
+KEEP = (
+    0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
+)
+
+
+def steps_per_second(omega: float, speed: float, thickness: float, edge: float) -> float:
+    """Steps [1/s] that are stable, and short against the thinnest body and for an impact.
+
+    Args:
+        omega: largest frequency [1/s]
+        speed: largest relative speed [m/s]
+        thickness: of the thinnest body [m]
+        edge: shortest mean edge of a body [m]
+    """
+    stable = omega / (2.0 * SAFETY)
+    passing = speed / (REACH * thickness)
+    clean = min(speed / (TRAVEL * edge), PATIENCE * stable)
+    return max(stable, passing, clean)
+
+
+def steps_in_frame(per_second: float, fps: float, last: int) -> int:
+    """Whole steps in a frame: ``per_second`` [1/s], and hardly fewer than the ``last`` frame's."""
+    return max(1, int(KEEP * last), math.ceil(per_second / fps))
+
+
+def with_penalty(omega: float, stiffness: float, inv_mass: float) -> float:
+    """Frequency [1/s] with a penalty [N/m] on the lightest vertex, of ``inv_mass`` [1/kg]."""
+    return math.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
+
+
+def stays_stable(dt: float, omega: float, damped: bool) -> bool:
+    """Whether a step ``dt`` [s] is stable at the frequency ``omega`` [1/s] of its frame's end."""
+    return dt * omega <= (UNSTABLE_DAMPED if damped else UNSTABLE)
+
+
+def stays_damped(dt: float, rate: float, after: float) -> bool:
+    """Whether the stages for the damping ``rate`` [1/s] do for that ``after`` the frame too."""
+    return stages_for(after / MARGIN, dt) <= stages_for(rate, dt)
+
+
+def raised(before: tuple[float, float], after: tuple[float, float]) -> tuple[float, float]:
+    """Frequency and damping rate [1/s] for the repeat of a frame, from those at both its ends."""
+    return max(RAISED * before[0], after[0]), max(before[1], after[1])

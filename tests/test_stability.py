@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
-from stable import chart, degenerate, limits, outcome, primitives, speed, sweeps
+from stable import chart, degenerate, figures, limits, outcome, paper, primitives, speed, sweeps
 from stable.outcome import Record, classify, level
 from stable.setup import METHODS, attempt, response
 from stable.watch import Setting, Watch
@@ -34,6 +34,7 @@ CASES = {
     "ball of 67 m/s": partial(speed.golf, 41, 67.0),
     "tet in a slot": partial(primitives.slot, 5e-7),
     "faces at distance zero": degenerate.pair,
+    "three cubes on a membrane": partial(figures.membrane, 0.2),
 }
 
 
@@ -87,8 +88,22 @@ def test_a_body_on_the_other_side_is_lost():
 def test_a_body_that_fell_past_another_is_not_lost():
     watch = two_blocks()
     x = watch.sim.positions()
-    x[27:] += [1.2, 0.0, -2.2]
-    assert seen(watch, x) == outcome.FINE
+    for way in ([1.2, 0.0, 0.0], [0.0, 0.0, -2.2]):
+        x[27:] += way
+        assert seen(watch, x) == outcome.FINE
+
+
+def test_points_that_went_through_make_a_body_lost():
+    watch = two_blocks()
+    x = watch.sim.positions()
+    corner = x[27:].sum(axis=1).argmin()
+    for way in ([0.3, 0.3, 0.0], [0.0, 0.0, -1.3]):
+        x[27 + corner] += way
+        watch.sim.state.x.assign(x.astype(np.float32))
+        watch.look()
+    assert watch.record.tunnelled == 1
+    assert classify(watch.record) == outcome.LOST
+    assert watch.record.reason == "1 points, of body1 through body0"
 
 
 def test_a_body_behind_a_plane_is_lost():
@@ -180,11 +195,46 @@ def test_the_frontier_runs_between_fine_and_other_cells():
     assert sides == [((0.5, 0.5), (-0.5, 0.5)), ((0.5, 1.5), (0.5, 0.5))]
 
 
+@pytest.mark.parametrize("sweep", sweeps.SWEEPS)
+def test_every_scene_of_the_paper_has_a_place_in_every_map(sweep):
+    s = sweeps.SWEEPS[sweep]
+    found = paper.marks(sweep, s.build(s.x[0], s.y[0]).scene)
+    assert {figure for figure, _, _ in found} == {1, 6, 7, 8, 9, 10}
+    assert np.isfinite([place for _, *place in found]).all()
+
+
+def test_a_scene_is_marked_with_what_its_file_says():
+    cell = sweeps.SWEEPS["depth"].build(0.1, 0.1).scene
+    found = paper.marks("depth", cell)
+    np.testing.assert_allclose([p for figure, *p in found if figure == 6], [[0.1, 1.0]])
+    found = [p for figure, *p in paper.marks("ratio", cell) if figure == 6]
+    np.testing.assert_allclose(found, [[1.0, 1.0], [1.0, 10.0]])
+
+
+def test_a_mark_lies_between_the_cells_of_its_value(rng):
+    values = np.geomspace(*np.sort(rng.uniform(1e-3, 1e3, 2)), 7)
+    for k, value in enumerate(values):
+        np.testing.assert_allclose(chart.place(value, values)[0], k, atol=1e-9)
+    half = np.sqrt(values[2] * values[3])
+    np.testing.assert_allclose(chart.place(half, values)[0], 2.5)
+    step = values[1] / values[0]
+    assert chart.place(values[-1] * step, values) == (6.5, True)
+    assert chart.place(0.0, values) == (-0.5, True)
+
+
+def test_scenes_in_one_place_share_a_mark():
+    xs = ys = np.geomspace(1.0, 1e4, 5)
+    scenes = [(1, 10.0, 10.0), (6, 10.0, 10.5), (6, 10.0, 11.0), (7, 1e3, 1e9)]
+    found = chart.labels(scenes, xs, ys)
+    assert list(found.values()) == [("1, 6", "white"), ("7", "lightgrey")]
+
+
 def test_the_map_writes_a_row_per_cell_and_a_picture(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(chart, "METHODS", METHODS[:2])
     monkeypatch.setattr(sweeps, "COARSE", 2)
     monkeypatch.setitem(chart.SWEEPS, "small", sweeps.SWEEPS["speed"])
+    monkeypatch.setitem(paper.PLACES, "small", paper.speed_step)
     assert chart.draw(["small"], True, tmp_path) == 0
     rows = (tmp_path / "map.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * 4

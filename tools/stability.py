@@ -21,11 +21,12 @@ FAMILIES = {
     "limits": "B10 what the method was not made for",
     "speed": "B9 speed and tunnelling",
     "ratios": "B3 mass and stiffness ratios",
+    "figures": "B4 to B7 the scenes of the paper",
     "primitives": "B2 primitive pairs",
     "spikes": "B1 spikes, wedges, edges, holes",
     "degenerate": "B11 degenerate input",
 }
-WIDTHS = 46, 11, 9, 9, 9, 9, 8, 10  # [characters]
+WIDTHS = 48, 10, 8, 8, 9, 9, 7, 7, 9  # [characters]
 OUT = Path(__file__).parent / "results" / "stability"
 
 
@@ -62,7 +63,8 @@ def check(parser, names, known) -> None:
 
 def show(families: list[str], args) -> int:
     """Run the cases and print them as they come."""
-    head = "case", "outcome", "overlap", "gained", "lowest", "volume", "steps", "level", "reason"
+    head = "case", "outcome", "overlap", "gained", "lowest", "volume"
+    head += "passed", "steps", "level", "reason"
     line = cells(*head)
     print(f"response {args.response}\n{line}\n{'-' * len(line)}")
     missed = 0
@@ -70,12 +72,13 @@ def show(families: list[str], args) -> int:
         for case in import_module(f"stable.{family}").cases(args.quick):
             if args.only not in case.name:
                 continue
-            r = attempt(case.build, args.response)
+            r = attempt(case.build, args.response, limit=case.limit)
             found = level(r, case.expect)
             missed += found == MISSED
             numbers = f"{r.overlap:.2%}", f"{r.gained:.2%}", f"{r.lowest:.3g}", f"{r.volume:.3g}"
             reason = r.reason
-            print(cells(case.name, classify(r), *numbers, str(r.steps), found, reason), flush=True)
+            counts = str(r.tunnelled), str(r.steps)
+            print(cells(case.name, classify(r), *numbers, *counts, found, reason), flush=True)
     print(f"{missed} missed" if missed else "all met")
     return 1 if missed else 0
 

@@ -7,10 +7,12 @@ import warp as wp
 
 from warp_contact import topology
 from warp_contact.forces import energies, internal_forces
+from warp_contact.kernels import bounds, motion, passing
 from warp_contact.kernels import measure as kernels
-from warp_contact.kernels import motion
 from warp_contact.types import Model, State
-from warp_contact.work import Work, launch_body_boxes, launch_triangle_boxes
+from warp_contact.work import Work
+
+UNHELD = 0.01  # of the mean edge of a vertex's body: what is less deep needs no contact
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,18 @@ class Measure:
         overlap_pair: labels of its bodies, None without overlap
         n_contacts: contacts in the last step
         volume_ratio: smallest volume of a tet over its rest volume
+        inverted: tets that are inside out or flat
+        tunnelled: points that went through another body so far; a point is a surface vertex or the
+            middle of a surface edge. It counts where it goes out by a face that looks away from the
+            one by which it came in and was deeper than a tenth of the body's thickness (twice its
+            volume over its surface), or where it gets deeper below a plane than its own body is
+            thick. From one call to the next, ways are taken as straight: call often. Not seen:
+            what happened before the first call, what turned round between two calls, points that
+            were inside a body at the first call, and parts that slip between the points of a
+            coarser body. A body that starts on both sides of another and is led back counts
+        tunnelled_pair: labels of the bodies of the last of these, the one that went through first
+        unheld: surface vertices in another body or below a plane, by more than 0.01 of a mean edge,
+            that had no contact in the last step
         forces: mean contact force of the frame between two bodies, by their labels [N]
     """
 
@@ -40,6 +54,10 @@ class Measure:
     overlap_pair: tuple[str, str] | None
     n_contacts: int
     volume_ratio: float
+    inverted: int
+    tunnelled: int
+    tunnelled_pair: tuple[str, str] | None
+    unheld: int
     forces: dict[tuple[str, str], float]
 
     @property
@@ -49,7 +67,10 @@ class Measure:
 
 
 class Meter:
-    """Measures states of one model; its memory is allocated at the first use."""
+    """Measures states of one model; its memory is allocated at the first use.
+
+    It remembers the last state it measured, to tell what went through what since then.
+    """
 
     def __init__(self, model: Model):
         """Read what stays constant."""
@@ -59,6 +80,7 @@ class Meter:
         self._tets = model.tets.numpy()
         self._volume = model.volume.numpy()
         self._bvhs = None
+        self._tunnelled, self._tunnelled_pair = 0, None
 
     def measure(self, state: State, work: Work, unit: float, duration: float, dt: float) -> Measure:
         """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s]."""
@@ -68,7 +90,9 @@ class Meter:
         energy = wp.zeros(model.n_tet, dtype=float)
         energies(model, state.x, energy)
         p = self.mass[:, None] * v
-        overlap, pair = self.overlap(state.x)
+        ratio = topology.signed_volumes(x, self._tets) / self._volume
+        self._follow(state.x)
+        overlap, pair, unheld = self.overlap(state.x, work)
         return Measure(
             kinetic=float(0.5 * (p * v).sum() + 0.5 * dt * (self._forces(state.x, work) * v).sum()),
             elastic=float(energy.numpy().sum(dtype=np.float64)),
@@ -78,7 +102,11 @@ class Meter:
             overlap=overlap,
             overlap_pair=pair,
             n_contacts=int((work.contacts.coef.numpy()[: self._n(work)] != 0.0).any(1).sum()),
-            volume_ratio=float((topology.signed_volumes(x, self._tets) / self._volume).min()),
+            volume_ratio=float(ratio.min()),
+            inverted=int((ratio <= 0.0).sum()),
+            tunnelled=self._tunnelled,
+            tunnelled_pair=self._tunnelled_pair,
+            unheld=unheld if duration > 0.0 else 0,
             forces=self.forces(work, unit, duration),
         )
 
@@ -109,10 +137,10 @@ class Meter:
                 out[pair] = float(np.linalg.norm(total[k]) / duration)
         return out
 
-    def overlap(self, x: wp.array) -> tuple[float, tuple[str, str] | None]:
-        """Deepest overlap [m] and the labels of its bodies."""
+    def overlap(self, x: wp.array, work: Work) -> tuple[float, tuple[str, str] | None, int]:
+        """Deepest overlap [m], the labels of its bodies, and the vertices that nothing holds."""
         model = self.model
-        bodies, surface, volumes = self._refit(x)
+        bodies, surface, volumes = self._refit(x, x)
         at_vert = wp.zeros(model.n_surf, dtype=float), wp.zeros(model.n_surf, dtype=int)
         at_edge = wp.zeros(model.n_edge, dtype=float), wp.zeros(model.n_edge, dtype=int)
         wp.launch(
@@ -135,21 +163,66 @@ class Meter:
         first = np.concatenate([model.surf.numpy(), model.edges.numpy()[:, 0]])
         k = int(depth.argmax())
         if depth[k] <= 0.0:
-            return 0.0, None
-        own = model.vert_body.numpy()[first[k]]
-        return float(depth[k]), (self.names[own], self.names[partner[k]])
+            return 0.0, None, 0
+        own = model.vert_body.numpy()[first]
+        deep = depth > UNHELD * model.body_edge.numpy()[own]
+        unheld = np.setdiff1d(first[: model.n_surf][deep[: model.n_surf]], self._held(work))
+        return float(depth[k]), (self.names[own[k]], self.names[partner[k]]), len(unheld)
 
-    def _refit(self, x: wp.array) -> tuple[wp.Bvh, wp.Bvh, wp.Bvh]:
+    def _held(self, work: Work) -> np.ndarray:
+        """Vertices that a contact of the last step moved out of another body or plane."""
+        n = self._n(work)
+        own = work.contacts.vert.numpy()[:n, :2]  # the others are those of the other side
+        return own[work.contacts.coef.numpy()[:n, :2] != 0.0]
+
+    def _follow(self, x: wp.array) -> None:
+        """Count the points that went through something since the last call."""
+        model = self.model
+        if self._bvhs is None:
+            surf = np.repeat(model.surf.numpy()[:, None], 2, axis=1)
+            ends = np.concatenate([surf, model.edges.numpy()[:, :2]])
+            self._ends = wp.array(ends, dtype=wp.vec2i)
+            self._entered = wp.full(len(ends), -1, dtype=int)
+            self._deep = wp.zeros(len(ends), dtype=int)
+            self._last = wp.clone(x)
+            return
+        bodies, surface, _ = self._refit(self._last, x)
+        passed = wp.zeros(len(self._ends), dtype=int)
+        wp.launch(
+            passing.follow_points,
+            dim=len(self._ends),
+            inputs=[bodies.id, surface.id, model.tris, model.tri_body, self._ends]
+            + [model.vert_body, model.body_world, model.body_thickness]
+            + [model.plane_n, model.plane_h, self._last, x],
+            outputs=[self._entered, self._deep, passed],
+        )
+        wp.copy(self._last, x)
+        body = passed.numpy()
+        through = np.flatnonzero(body >= 0)
+        self._tunnelled += len(through)
+        if len(through):
+            own = model.vert_body.numpy()[self._ends.numpy()[through[-1], 0]]
+            self._tunnelled_pair = self.names[own], self.names[body[through[-1]]]
+
+    def _refit(self, x0: wp.array, x: wp.array) -> tuple[wp.Bvh, wp.Bvh, wp.Bvh]:
+        """Trees over the ways of bodies and triangles from x0 to x, and over the tets at x."""
         model = self.model
         if self._bvhs is None:
             sizes = model.n_body, model.n_tri, model.n_tet
             self._boxes = [(wp.zeros(n, dtype=wp.vec3), wp.zeros(n, dtype=wp.vec3)) for n in sizes]
-            self._near = wp.full(model.n_body, 1, dtype=int)
             self._skin = wp.zeros(model.n_body, dtype=float)
-        of_body, of_tri, of_tet = self._boxes
-        launch_body_boxes(model, x, self._skin, *of_body)
-        launch_triangle_boxes(model, x, self._skin, self._near, *of_tri)
-        wp.launch(kernels.tet_boxes, dim=model.n_tet, inputs=[model.tets, x], outputs=list(of_tet))
+        of_body, of_tri, of_tet = (list(box) for box in self._boxes)
+        wp.launch(bounds.clear_boxes, dim=model.n_body, inputs=[], outputs=of_body)
+        for place in (x0, x):
+            wp.launch(
+                bounds.body_boxes,
+                dim=-(-model.n_surf // int(bounds.CHUNK)),
+                inputs=[model.surf, model.vert_body, self._skin, place],
+                outputs=of_body,
+            )
+        ways = [model.tris, model.tri_body, model.body_edge, x0, x]
+        wp.launch(passing.triangle_paths, dim=model.n_tri, inputs=ways, outputs=of_tri)
+        wp.launch(kernels.tet_boxes, dim=model.n_tet, inputs=[model.tets, x], outputs=of_tet)
         if self._bvhs is None:
             vert_body = model.vert_body.numpy()
             world = model.body_world.numpy()[vert_body[self._tets[:, 0]]]

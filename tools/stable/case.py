@@ -21,11 +21,13 @@ class Case:
         name: number in the specification and a few words
         build: its setting; raises ValueError where the input is refused
         expect: ``fine`` or ``refused``
+        limit: seconds that it may take
     """
 
     name: str
     build: Callable[[], Setting]
     expect: str = FINE
+    limit: float = 120.0
 
 
 def soft(young: float = 1e5, density: float = 1000.0, poisson: float = 0.4) -> wc.NeoHookean:

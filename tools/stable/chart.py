@@ -1,20 +1,33 @@
-"""The map: a table with a row per cell, a heat map per sweep with the frontier of what is fine."""
+"""The map: a table with a row per cell, a heat map per sweep with the frontier of what is fine.
+
+The paper's scenes are marked where they lie (stable/paper.py).
+"""
 
 import csv
 import sys
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from stable.outcome import FINE, OUTCOMES, Record, classify
+from stable.paper import FIGURES, marks
 from stable.setup import METHODS, attempt
 from stable.sweeps import MOST_STEPS, SWEEPS
 
 COLUMNS = (
     *("sweep", "method", "x_name", "x", "y_name", "y", "outcome", "overlap", "energy_gained"),
-    *("lowest_volume", "end_volume", "touched", "steps", "time", "asked", "reason"),
+    *("lowest_volume", "end_volume", "tunnelled", "touched", "steps", "time", "asked", "reason"),
 )
 COLOURS = "#dcefdc", "#f6d55c", "#ed8b3b", "#c0392b", "#5b2c6f", "#8d99a6", "#1b1b1b", "#ffffff"
 LIMIT = 30.0  # seconds that a cell may take
+KEY = "\n".join(
+    [
+        "The paper's scenes, by its figures",
+        *(f"{figure:>4}  {scene}" for scene, (figure, *_) in FIGURES.items()),
+        "grey on the rim: off the map",
+    ]
+)
 
 
 def draw(names: list[str], quick: bool, out: Path) -> int:
@@ -68,14 +81,15 @@ def sweep(name: str, method: str, quick: bool, table, file) -> list[list[str]]:
 
 def row(r: Record) -> tuple:
     """The figures of a cell."""
-    figures = r.overlap, r.gained, r.lowest, r.volume, r.touched, r.steps, r.time, r.asked
-    return classify(r), *figures, r.reason
+    state = r.overlap, r.gained, r.lowest, r.volume, r.tunnelled
+    return classify(r), *state, r.touched, r.steps, r.time, r.asked, r.reason
 
 
 def picture(plots, name: str, quick: bool, found: dict, path: Path) -> None:
-    """A panel per method: colours of the outcomes, a line around what is fine."""
+    """A panel per method: colours of the outcomes, a line around what is fine, the scenes."""
     s = SWEEPS[name]
     xs, ys = s.axes(quick)
+    scenes = marks(name, s.build(xs[0], ys[0]).scene)
     figure, axes = plots.subplots(2, 4, figsize=(16, 8), layout="constrained")
     figure.suptitle(s.title)
     for axis, (method, grid) in zip(axes.flat, found.items(), strict=False):
@@ -84,6 +98,9 @@ def picture(plots, name: str, quick: bool, found: dict, path: Path) -> None:
         axis.imshow(codes, origin="lower", cmap=colours, vmin=-0.5, vmax=len(OUTCOMES) - 0.5)
         for ends in frontier(grid):
             axis.plot(*ends, color="black", linewidth=2.0)
+        for (i, j), (text, colour) in labels(scenes, xs, ys).items():
+            box = {"boxstyle": "round,pad=0.15", "facecolor": colour, "linewidth": 0.8}
+            axis.text(i, j, text, fontsize=8, ha="center", va="center", bbox=box)
         axis.set_title(method)
         axis.set_xticks(range(len(xs)), [f"{x:.2g}" for x in xs], rotation=90)
         axis.set_yticks(range(len(ys)), [f"{y:.2g}" for y in ys])
@@ -93,9 +110,34 @@ def picture(plots, name: str, quick: bool, found: dict, path: Path) -> None:
     legend.axis("off")
     for outcome, colour in zip(OUTCOMES, COLOURS, strict=True):
         legend.scatter([], [], s=120, marker="s", color=colour, edgecolor="grey", label=outcome)
-    legend.legend(loc="center", fontsize=12)
+    legend.plot([], [], color="black", linewidth=2.0, label="frontier of what is fine")
+    legend.legend(loc="upper center", fontsize=11, ncols=2)
+    legend.text(0.02, 0.02, KEY, transform=legend.transAxes, fontsize=10, va="bottom")
     figure.savefig(path, dpi=100)
     plots.close(figure)
+
+
+def labels(scenes: list[tuple], xs: np.ndarray, ys: np.ndarray) -> dict:
+    """Text and colour of the marks by their place; scenes in one place share a mark."""
+    found = {}
+    for figure, x, y in scenes:
+        (i, aside), (j, above) = place(x, xs), place(y, ys)
+        colour = "lightgrey" if aside or above else "white"
+        near = [at for at in found if np.hypot(at[0] - i, at[1] - j) < 0.04 * len(xs)]
+        at = near[0] if near else (i, j)
+        text = found[at][0] if near else ""
+        if str(figure) not in text.split(", "):
+            text = f"{text}, {figure}" if text else str(figure)
+        found[at] = text, colour
+    return found
+
+
+def place(value: float, values: np.ndarray) -> tuple[float, bool]:
+    """Where a value lies between the cells, and whether it is off the map, then on its rim."""
+    last = len(values) - 1
+    with np.errstate(divide="ignore"):
+        at = last * float(np.log(value / values[0]) / np.log(values[-1] / values[0]))
+    return float(np.clip(at, -0.5, last + 0.5)), not -0.5 <= at <= last + 0.5
 
 
 def frontier(grid: list[list[str]]) -> list[tuple[tuple, tuple]]:

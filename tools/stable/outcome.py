@@ -4,7 +4,8 @@
     refused     an error before the first step
     not finite  a position or velocity is not a number
     stopped     the solver found no step, or the run took longer than it may
-    lost        a body is on the wrong side of another body or of a plane
+    lost        a body is on the wrong side of another body or of a plane, or points of it went
+                through the other (``tunnelled`` of ``measure()``)
     inverted    a tet is inside out or flat at the end; on the way it only costs a level
     energy      the total energy rose by more than ``GAIN`` of its scale
     overlap     the deepest overlap was more than ``SUNK`` of the thinnest body
@@ -34,6 +35,8 @@ class Record:
         error: the error that ended the run
         finite: whether all positions and velocities were numbers
         lost: who was on whose wrong side
+        tunnelled: points that went through another body; 0 for a run that starts with an overlap
+        through: the bodies of the last of them
         overlap: deepest of all frames, or of the last one for a run that starts with an overlap;
             of the smallest extent of a body
         gained: largest rise of the energy over its scale; 0 for bodies that are driven
@@ -49,6 +52,8 @@ class Record:
     error: str = ""
     finite: bool = True
     lost: str = ""
+    tunnelled: int = 0
+    through: tuple[str, str] | None = None
     overlap: float = 0.0
     gained: float = 0.0
     volume: float = 1.0
@@ -61,7 +66,10 @@ class Record:
     @property
     def reason(self) -> str:
         """What there is to say beyond the outcome."""
-        return self.refused or self.error or self.lost
+        passed = ""
+        if self.through:
+            passed = "{} points, of {} through {}".format(self.tunnelled, *self.through)
+        return self.refused or self.error or self.lost or passed
 
 
 def classify(r: Record) -> str:
@@ -70,7 +78,7 @@ def classify(r: Record) -> str:
         (REFUSED, bool(r.refused)),
         (INFINITE, not r.finite),
         (STOPPED, bool(r.error)),
-        (LOST, bool(r.lost)),
+        (LOST, bool(r.lost) or r.tunnelled > 0),
         (INVERTED, not r.volume > FLAT),
         (ENERGY, not r.gained <= GAIN),
         (OVERLAP, not r.overlap <= SUNK),

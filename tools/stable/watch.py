@@ -108,6 +108,8 @@ class Watch:
         r.lost = r.lost or self.wrong_side()
         now = sim.measure()
         r.touched = r.touched or now.n_contacts > 0 or bool(now.forces)
+        if not self.setting.recovers:
+            r.tunnelled, r.through = now.tunnelled, now.tunnelled_pair
         deepest = now.overlap / self.size
         r.overlap = deepest if self.setting.recovers else max(r.overlap, deepest)
         self._flight = max(self._flight, self.flight())

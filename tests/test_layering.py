@@ -13,7 +13,7 @@ SCENES = sorted((ROOT / "scenes").glob("*.py"))
 LADDER = (  # a module imports from lower rungs only
     {"kernels"},
     {"topology", "errors", "progress", "response", "types", "usd_scene", "materials"},
-    {"mesh", "work", "forces", "usd"},
+    {"mesh", "work", "forces", "usd", "checkpoint"},
     {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"},
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},
     {"solver"},

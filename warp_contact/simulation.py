@@ -1,13 +1,14 @@
 """A scene in motion: frames, automatic substeps, what a user reads and sets between frames."""
 
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import astuple
 
 import numpy as np
 import warp as wp
 
-from warp_contact import solver
+from warp_contact import checkpoint, solver
 from warp_contact.assemble import assemble
 from warp_contact.errors import SimulationError
 from warp_contact.forces import stages_for
@@ -213,6 +214,46 @@ class Simulation:
             "penetration": penetration,
             "partner": partner,
         }
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write a checkpoint: a run that goes on from it gives the bits of one never interrupted.
+
+        The scene is not in it: build it anew, make a ``Simulation`` of it with the same settings,
+        and ``load`` the file. Velocities given to fixed vertices are part of it.
+        """
+        with wp.ScopedDevice(self.device):
+            values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
+            values |= {"frame": np.array(self.frame), "substeps": np.array(self.substeps)}
+            values |= {f"start.{k}": start for k, start in self._spectrum.starts().items()}
+        if self._search is not None:
+            values |= {"search": np.array(self._search)}
+        if self._dt is not None:
+            values |= {"dt": np.array(self._dt), "rates": np.array(self._rates)}
+        checkpoint.write(path, self._fingerprint(), values)
+
+    def load(self, path: str | os.PathLike) -> None:
+        """Go on from a checkpoint. What is measured of the last frame is empty until the next.
+
+        Raises:
+            OSError: it cannot be read
+            ValueError: it is no checkpoint, or one of another scene or other settings
+        """
+        values = checkpoint.read(path, self._fingerprint())
+        with wp.ScopedDevice(self.device):
+            self.state.x.assign(values["x"])
+            self.state.v.assign(values["v"])
+            starts = {k[6:]: start for k, start in values.items() if k.startswith("start.")}
+            self._spectrum.start_from(starts)
+            self._work = allocate_work(self.model, self.state, self._work.capacity)
+        self._graphs.clear()
+        self._meter = Meter(self.model)
+        self.frame, self.substeps = int(values["frame"]), int(values["substeps"])
+        self._search = bool(values["search"]) if "search" in values else None
+        self._dt = float(values["dt"]) if "dt" in values else None
+        self._rates = tuple(map(float, values["rates"])) if "rates" in values else None
+
+    def _fingerprint(self) -> str:
+        return checkpoint.fingerprint(self.model, self.response, self.fps, self._wanted)
 
     def _run(self, omega: float, rate: float, last: int) -> float:
         """Step one frame at the rates [1/s] given, after ``last`` steps; return the step [s]."""

@@ -69,6 +69,19 @@ class Spectrum:
             self._f_tet.zero_()
         return self._largest(forces.apply_damping, x)
 
+    def starts(self) -> dict[str, np.ndarray]:
+        """What the next calls start from, by the stage they are of; shape (n_vert, 3) each."""
+        return {apply.__name__: start.numpy() for apply, start in self._start.items()}
+
+    def start_from(self, starts: dict[str, np.ndarray]) -> None:
+        """Let the next calls start from what ``starts`` gave."""
+        applies = forces.apply_stiffness, forces.apply_damping
+        self._start = {
+            apply: wp.array(starts[apply.__name__], dtype=wp.vec3)
+            for apply in applies
+            if apply.__name__ in starts
+        }
+
     def _largest(self, apply: Callable, x: wp.array) -> float:
         wp.copy(self._x, x)
         first = apply not in self._start

@@ -13,7 +13,8 @@ wp.set_module_options({"enable_backward": False})
 def add_pair_impulses(
     # in
     unit: float,  # momentum of one count [N s]
-    n_contact: wp.array[int],  # (1,)
+    first: wp.array[int],  # (1,)
+    end: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,)
     normal: wp.array[wp.vec3],  # (capacity,)
     lam: wp.array[float],  # (capacity,) [N s]
@@ -23,9 +24,9 @@ def add_pair_impulses(
     total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
     needed: wp.array[int],  # (1,) pairs that would have been enough
 ):
-    """One thread per contact: add to its pair, as integers, whose sum has no order."""
+    """One thread per contact: add those from the first to the end to their pairs, as integers."""
     c = wp.tid()
-    if c >= n_contact[0] or lam[c] <= 0.0:
+    if c < first[0] or c >= end[0] or lam[c] <= 0.0:
         return
     p = lam[c] * normal[c] + slip[c]
     lo = pair[c][0]

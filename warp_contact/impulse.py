@@ -102,12 +102,26 @@ def push_apart(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
 
 
 def record(model: Model, work: Work, unit: float) -> None:
-    """Add the impulses of the step to their pairs of bodies, in counts of ``unit`` [N s]."""
+    """Add the impulses of all contacts to their pairs of bodies, in counts of ``unit`` [N s]."""
+    _record(work, unit, work.none, work.contacts.n)
+
+
+def record_vertices(work: Work, unit: float) -> None:
+    """As ``record``, of the contacts of vertices only."""
+    _record(work, unit, work.none, work.n_hit)
+
+
+def record_edges(work: Work, unit: float) -> None:
+    """As ``record``, of the contacts of edges only."""
+    _record(work, unit, work.n_hit, work.contacts.n)
+
+
+def _record(work: Work, unit: float, first: wp.array, end: wp.array) -> None:
     c = work.contacts
     wp.launch(
         pair_impulses.add_pair_impulses,
         dim=work.capacity.contacts,
-        inputs=[unit, c.n, c.pair, c.normal, c.lam, c.slip],
+        inputs=[unit, first, end, c.pair, c.normal, c.lam, c.slip],
         outputs=[work.pair_key, work.pair_total, c.needed[1:2]],
     )
 

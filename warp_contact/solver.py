@@ -36,6 +36,19 @@ def step(
         impulse.recall(model, state.v, work)
         exchange()
 
+    def exchange_edges() -> None:
+        exchange()
+        impulse.record_edges(work, unit)
+
+    def exchange_twice() -> None:
+        exchange_edges()
+        # The impulses may have led other edges across each other. Were these left to the closure,
+        # they would go on to approach, and what it displaces would gain energy.
+        drift(model, state, work, work.x)
+        edge_contacts(model, state.x, work.x, work, True)
+        surface.leftover(model, work.x, work)
+        wp.capture_if(work.found[0:1], exchange_edges)
+
     if isinstance(response, Penalty):
         candidates.refresh(model, state.x, state.x, work)
         # Forces belong to the positions they act at.
@@ -68,9 +81,9 @@ def step(
         wp.capture_if(c.n, begin)
         drift(model, state, work, work.x)
         edge_contacts(model, state.x, work.x, work, not search)
-        wp.capture_if(work.n_crossing, exchange)
+        wp.capture_if(work.n_crossing, exchange_edges if search else exchange_twice)
         impulse.keep(work)
-        impulse.record(model, work, unit)
+        impulse.record_vertices(work, unit)
         drift(model, state, work, state.x)
         edge_contacts(model, state.x, state.x, work, not search)
         move_surfaces(model, state, work, response, search)  # what the step did not create

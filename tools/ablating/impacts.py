@@ -8,6 +8,7 @@ import warp_contact as wc
 
 OVERLAP = "deepest overlap [% of an edge]"
 SPIN = "angular momentum [of sum m |x| |v|]"
+GAINED = "energy gained [of that at the start]"
 APPROACH = "approach left [of that before]"
 
 
@@ -41,9 +42,10 @@ def hard() -> dict[str, float]:
     return struck(5.0, 5e4, 240.0, 24)
 
 
-def soft() -> dict[str, float]:
-    """Soft tilted block at 2 m/s."""
-    return struck(2.0, 2e4, 60.0, 12)
+def shifted() -> dict[str, float]:
+    """Collision of tilted blocks, 2:5 cells, off the middle."""
+    found = collision.collide(collision.build(2, 5, 1.0, "tilted shifted"))
+    return {GAINED: max(found["largest energy [of that at the start]"] - 1.0, 0.0)}
 
 
 def thin() -> dict[str, float]:

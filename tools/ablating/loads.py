@@ -5,7 +5,7 @@ from unittest import mock
 
 import warp as wp
 from checks import surface as stage_4
-from verification import springs, stack
+from verification import ladder, springs
 from verification import weight as static
 from verification.setup import Ask, Pose
 
@@ -16,7 +16,7 @@ from warp_contact.kernels import impulse as impulse_kernels
 INSERTED = "energy that it puts in [J]"
 PLACE = "place of the surface [% of the overlap]"
 PRESSED = "contact force [of the exact one]"
-CARRIED = "force on the lowest [of the weight]"
+CARRIED = "mean force [of the weight]"
 SWEEPS = "sweeps of the impulses in a step"
 
 
@@ -45,9 +45,9 @@ def columns() -> dict[str, float]:
     return {PRESSED: abs(next(pressed).error)}
 
 
-def stacked() -> dict[str, float]:
-    """A1 stack of five cubes."""
-    return {CARRIED: abs(next(stack.stand(Ask(), (4, 3), "structured", Pose())).error)}
+def heavy() -> dict[str, float]:
+    """A7m heavy on light, mass ratio 100."""
+    return {CARRIED: abs(next(ladder.carry(Ask(), 100.0)).error)}
 
 
 def sheet() -> dict[str, float]:
@@ -64,7 +64,7 @@ def sheet() -> dict[str, float]:
     with (
         mock.patch.multiple(static, SETTLE=0.3, SAMPLE=0.1),
         mock.patch.object(impulse, "next_sweep", counting(impulse.next_sweep, sweeps)),
-        mock.patch.object(impulse, "record", counting(impulse.record, steps)),
+        mock.patch.object(impulse, "record_vertices", counting(impulse.record_vertices, steps)),
     ):
         list(static.on_sheet("", Ask()))
     return {SWEEPS: float(sweeps.numpy()[0] / steps.numpy()[0])}

@@ -31,6 +31,7 @@ class Part:
 
 
 FINEST = 100.0 * surface.TOLERANCE  # % of an edge: an overlap that is left on purpose
+GAIN = 1e-3  # of the energy: what a pile of roundings and closures may add
 ROUNDED = 1e-6  # of the angular momentum: a walk of float32 over a thousand steps
 FORCE = 1e-5  # of a force: float32, and a sample of some frames
 PARTS = {
@@ -103,7 +104,7 @@ PARTS = {
     "ahead": Part(
         "extrapolation of the sweeps",
         without(wp, "launch", off.plain),
-        loads.stacked,
+        loads.heavy,
         loads.CARRIED,
         FORCE,
     ),
@@ -124,9 +125,9 @@ PARTS = {
     "impact": Part(
         "shorter steps at an impact",
         without(substeps, "TRAVEL", math.inf),
-        impacts.soft,
-        impacts.OVERLAP,
-        FINEST,
+        impacts.shifted,
+        impacts.GAINED,
+        GAIN,
     ),
     "thin": Part(
         "shorter steps for thin bodies",

@@ -26,6 +26,8 @@ STAGES = {  # the functions of a stage; the outermost call counts
         (impulse, "push_apart"),
         (impulse, "keep"),
         (impulse, "record"),
+        (impulse, "record_vertices"),
+        (impulse, "record_edges"),
     ),
     "closure": ((solver, "move_surfaces"),),
 }

@@ -10,7 +10,7 @@ the skin; the other half is for what impulses and the closure add to the predict
 
 Half the span is the number of steps that candidates last. It is the same for all bodies, and such
 that the mean of them has a skin of MEAN edges: some fast bodies do not wear out the candidates of a
-pile at rest, and where all are fast the lists stay short.
+pile at rest, and where all are fast the lists stay short. A body with nothing near has the LONGEST.
 
 Most candidates are not close to touching. A pair that is found apart by some distance sleeps until
 both bodies have come that way together; ``way`` adds up the largest motion of a body in each look.
@@ -95,10 +95,15 @@ def find_fastest(
 
 
 @wp.func
-def own_skin(motion: float, edge: float, total: int, n_body: int) -> float:
+def span(total: int, n_body: int) -> float:
+    """Largest motions in a step that a skin holds."""
     mean = float(total) / (UNIT * float(n_body))
-    span = wp.clamp(MEAN / wp.max(mean, 1.0e-6), SHORTEST, LONGEST)
-    return wp.max(span * motion, LEAST * edge)
+    return wp.clamp(MEAN / wp.max(mean, 1.0e-6), SHORTEST, LONGEST)
+
+
+@wp.func
+def own_skin(motion: float, edge: float, motions: float) -> float:
+    return wp.max(motions * motion, LEAST * edge)
 
 
 @wp.kernel
@@ -113,7 +118,7 @@ def widest_skins(
 ):
     """One thread per body: the skin it would have next to the fastest body."""
     m = wp.tid()
-    skin[m] = own_skin(motion[m], edge, total[0], motion.shape[0]) + fastest[0]
+    skin[m] = own_skin(motion[m], edge, span(total[0], motion.shape[0])) + fastest[0]
 
 
 @wp.kernel
@@ -136,7 +141,10 @@ def choose_skins(
         push = float(0.0)
         for k in range(n_near[m]):
             push = wp.max(push, motion[near[m, k]])
-    skin[m] = own_skin(motion[m], edge, total[0], motion.shape[0]) + push
+    motions = float(LONGEST)
+    if n_near[m] > 0:
+        motions = span(total[0], motion.shape[0])
+    skin[m] = own_skin(motion[m], edge, motions) + push
     stale[0] = 0
 
 

@@ -111,3 +111,15 @@ def list_pairs(
         items[c] = wp.vec2i(first, end)
         c += 1
         first = end
+
+
+@wp.kernel
+def any_pairs(
+    # in
+    verts: wp.array[int],  # (1,)
+    edges: wp.array[int],  # (1,)
+    # out
+    some: wp.array[int],  # (1,) 1 when there are pairs of either kind
+):
+    """One thread."""
+    some[0] = wp.where(verts[0] + edges[0] > 0, 1, 0)

@@ -28,6 +28,7 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
         _find_parts(model, work)
         _find_tets(model, work)
         _find_tris(model, work)
+        wp.launch(kernels.any_pairs, dim=1, inputs=[c.verts.n, c.edges.n], outputs=[c.some])
 
     wp.capture_if(c.stale, find)
 

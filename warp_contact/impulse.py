@@ -48,6 +48,14 @@ def keep(work: Work) -> None:
     )
 
 
+def forget(work: Work) -> None:
+    """There are no contacts in this step, and no impulses to start the next one from."""
+    work.n_hit.zero_()
+    work.n_crossing.zero_()
+    work.contacts.n.zero_()
+    work.partner.fill_(-1)
+
+
 def exchange(model: Model, v: wp.array, work: Work) -> None:
     """Change ``v`` by normal impulses and friction until no contact approaches."""
     c = work.contacts

@@ -49,6 +49,22 @@ def step(
         surface.leftover(model, work.x, work)
         wp.capture_if(work.found[0:1], exchange_edges)
 
+    def touch() -> None:
+        vertex_contacts(model, state.x, work.x, work, not search)
+        wp.capture_if(c.n, begin)
+        drift(model, state, work, work.x)
+        edge_contacts(model, state.x, work.x, work, not search)
+        wp.capture_if(work.n_crossing, exchange_edges if search else exchange_twice)
+        impulse.keep(work)
+        impulse.record_vertices(work, unit)
+        drift(model, state, work, state.x)
+        edge_contacts(model, state.x, state.x, work, not search)
+        move_surfaces(model, state, work, response, search)  # what the step did not create
+
+    def fly() -> None:
+        wp.copy(state.x, work.x)
+        impulse.forget(work)
+
     if isinstance(response, Penalty):
         candidates.refresh(model, state.x, state.x, work)
         # Forces belong to the positions they act at.
@@ -77,16 +93,7 @@ def step(
     else:
         predict(model, state, work, stages)
         candidates.refresh(model, state.x, work.x, work)
-        vertex_contacts(model, state.x, work.x, work, not search)
-        wp.capture_if(c.n, begin)
-        drift(model, state, work, work.x)
-        edge_contacts(model, state.x, work.x, work, not search)
-        wp.capture_if(work.n_crossing, exchange_edges if search else exchange_twice)
-        impulse.keep(work)
-        impulse.record_vertices(work, unit)
-        drift(model, state, work, state.x)
-        edge_contacts(model, state.x, state.x, work, not search)
-        move_surfaces(model, state, work, response, search)  # what the step did not create
+        wp.capture_if(work.candidates.some, touch, fly)
 
 
 def steps(model: Model, state: State, work: Work, *others) -> None:

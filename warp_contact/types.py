@@ -163,6 +163,7 @@ class Candidates:
         edge: shortest mean edge of a body [m]
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
+        some: whether there are any, shape (1,)
         last: positions of the last look [m], shape (n_vert,)
         way: sum of the motions since the candidates were found [m], shape (n_body + n_plane,)
         n_found: length of the list that is being filled, shape (1,)
@@ -179,6 +180,7 @@ class Candidates:
     edge: float
     verts: Pairs
     edges: Pairs
+    some: wp.array
     last: wp.array
     way: wp.array
     n_found: wp.array

@@ -228,6 +228,7 @@ def _allocate_candidates(model: Model, capacity: Capacity) -> Candidates:
         edge=float(model.body_edge.numpy().min()),
         verts=_allocate_pairs(model.n_vert, capacity.verts, capacity.tets),
         edges=_allocate_pairs(model.n_edge, capacity.edges, capacity.tris),
+        some=_ints(1),
         last=_vectors(model.n_vert),
         way=_floats(model.n_body + model.n_plane),
         n_found=_ints(1),

@@ -31,7 +31,7 @@ LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at 
 MEAN = wp.constant(0.08)  # of the shortest edge: longer lists cost more than they save
 SHORTEST = wp.constant(8.0)  # span
 LONGEST = wp.constant(64.0)  # span
-UNIT = wp.constant(1.0e5)  # counts of an edge, for a sum that does not depend on its order
+UNIT = wp.constant(1.0e4)  # counts of an edge, for a sum that does not depend on its order
 CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the maximum
 

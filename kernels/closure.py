@@ -28,6 +28,7 @@ wp.set_module_options({"enable_backward": False})
 @wp.kernel
 def leftover(
     # in
+    threads: int,
     tolerance: float,  # of an edge; less is not worth a move
     deep: float,  # of an edge; less at the start of the step is not worth a search
     n_contact: wp.array[int],  # (1,)
@@ -46,26 +47,25 @@ def leftover(
     found: wp.array[int],  # (2,) 1 when any overlap is to be closed, and to be searched
     deep_found: wp.array[int],  # (1,) 1 when any has been to be searched since the frame began
 ):
-    """One thread per contact: the overlap at x."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    left[c] = 0.0
-    if wp.length_sq(normal[c]) == 0.0:
-        return
-    d = -gap(c, vert, coef, normal, offset, pair[c][1] >= body_edge.shape[0], x)
-    edge = body_edge[pair[c][0]]
-    if d > tolerance * edge:
-        left[c] = d
-        found[0] = 1
-    if d > deep * edge and -closing[c] * dt[0] > deep * edge:
-        found[1] = 1
-        deep_found[0] = 1
+    """For each contact: the overlap at x."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        left[c] = 0.0
+        if wp.length_sq(normal[c]) == 0.0:
+            continue
+        d = -gap(c, vert, coef, normal, offset, pair[c][1] >= body_edge.shape[0], x)
+        edge = body_edge[pair[c][0]]
+        if d > tolerance * edge:
+            left[c] = d
+            found[0] = 1
+        if d > deep * edge and -closing[c] * dt[0] > deep * edge:
+            found[1] = 1
+            deep_found[0] = 1
 
 
 @wp.kernel
 def begin_closure(
     # in
+    threads: int,
     bound: float,  # largest move in a step, in edges
     deep: float,  # of an edge: an overlap at the start of the step that is left to the search
     n_contact: wp.array[int],  # (1,)
@@ -78,22 +78,21 @@ def begin_closure(
     slack: wp.array[float],  # (capacity,) [m]
     push: wp.array[float],  # (capacity,) [kg m]
 ):
-    """One thread per contact: what stays for later steps."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    edge = body_edge[pair[c][0]]
-    slack[c] = 0.0
-    if left[c] > 0.0:
-        slack[c] = wp.max(left[c] - bound * edge, 0.0) - REST * edge
-    if -closing[c] * dt[0] > deep * edge:
-        slack[c] = NONE
-    push[c] = 0.0
+    """For each contact: what stays for later steps."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        edge = body_edge[pair[c][0]]
+        slack[c] = 0.0
+        if left[c] > 0.0:
+            slack[c] = wp.max(left[c] - bound * edge, 0.0) - REST * edge
+        if -closing[c] * dt[0] > deep * edge:
+            slack[c] = NONE
+        push[c] = 0.0
 
 
 @wp.kernel
 def solve_gaps(
     # in
+    threads: int,
     tolerance: float,  # of an edge
     n_body: int,
     passes: int,  # at most
@@ -115,24 +114,23 @@ def solve_gaps(
     # out, added to
     again: wp.array[int],  # (1,) 1 when a gap is still open
 ):
-    """One thread per contact: what this pass adds to its push."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    p = float(0.0)
-    if weight[c] > 0.0:
-        g = gap(c, vert, coef, normal, offset, pair[c][1] >= n_body, x) + slack[c]
-        if g < -tolerance * body_edge[pair[c][0]] and done[0] < passes:
-            again[0] = 1
-        p = wp.max(push[c] - g / weight[c], 0.0)
-    for k in range(5):
-        part[5 * c + k] = coef[c, k] * (p - push[c]) * normal[c]
-    push[c] = p
+    """For each contact: what this pass adds to its push."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        p = float(0.0)
+        if weight[c] > 0.0:
+            g = gap(c, vert, coef, normal, offset, pair[c][1] >= n_body, x) + slack[c]
+            if g < -tolerance * body_edge[pair[c][0]] and done[0] < passes:
+                again[0] = 1
+            p = wp.max(push[c] - g / weight[c], 0.0)
+        for k in range(5):
+            part[5 * c + k] = coef[c, k] * (p - push[c]) * normal[c]
+        push[c] = p
 
 
 @wp.kernel
 def couples(
     # in
+    threads: int,
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -143,13 +141,11 @@ def couples(
     # out
     part: wp.array[wp.vec3],  # (5 capacity,) [kg m/s] what it hands back at each vertex
 ):
-    """One thread per contact: the couple that its push leaves behind."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    u = wp.vec3(0.0, 0.0, 0.0)
-    if push[c] > 0.0:
+    """For each contact: the couple that its push leaves behind."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        u = wp.vec3(0.0, 0.0, 0.0)
+        if push[c] > 0.0:
+            for k in range(5):
+                u += coef[c, k] * v[vert[c, k]]
         for k in range(5):
-            u += coef[c, k] * v[vert[c, k]]
-    for k in range(5):
-        part[5 * c + k] = push[c] * wp.dot(turn[c, k], u) * normal[c]
+            part[5 * c + k] = push[c] * wp.dot(turn[c, k], u) * normal[c]

@@ -6,7 +6,7 @@ Crossings are looked for where the impulses on the vertices lead.
 import warp as wp
 
 from warp_contact.kernels.candidates import CAREFUL, gap_to
-from warp_contact.kernels.edge_contact import edge_contact
+from warp_contact.kernels.edge_contact import EdgeContact, edge_contact
 from warp_contact.kernels.geometry import NONE, projected_crossing, projected_weights
 from warp_contact.kernels.vertex_contact import SLIP
 
@@ -36,6 +36,7 @@ def clearance(
 @wp.kernel
 def find_crossings(
     # in
+    threads: int,
     fresh: bool,  # there are no overlaps from before the step
     skin: wp.array[float],  # (n_body,) [m]
     n_pair: wp.array[int],  # (1,)
@@ -53,50 +54,43 @@ def find_crossings(
     # in, out
     wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no crossing
     # out
-    crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact
+    crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact, 0 already elsewhere
+    contact: wp.array[EdgeContact],  # (capacity,) which contact
 ):
-    """One thread per candidate, and one more for the end of the list."""
-    c = wp.tid()
-    crossing[c] = 0
-    if c >= n_pair[0]:
-        return
-    e = edges[pair[c][0]]
-    i = e[0]
-    j = e[1]
-    body = pair[c][1]
-    spent = way[vert_body[i]] + way[body]
-    reach = skin[vert_body[i]] + skin[body]
-    if spent < wake[c]:
-        return
-    clear = clearance(pair_tris[c], reach, tri, tris, x, x[i], x[j])
-    wake[c] = spent + CAREFUL * clear
-    if clear > 0.0:
-        return
-    edge = body_edge[body]
-    found = edge_contact(
-        surface, body, edge, fresh, reach, pair_tris[c], tri, tris, x0, x, edges[pair[c][0]]
-    )
-    if found.found:
-        crossing[c] = 1
+    """For each candidate."""
+    for c in range(wp.tid(), n_pair[0], threads):
+        e = edges[pair[c][0]]
+        i = e[0]
+        j = e[1]
+        body = pair[c][1]
+        spent = way[vert_body[i]] + way[body]
+        reach = skin[vert_body[i]] + skin[body]
+        if spent < wake[c]:
+            continue
+        clear = clearance(pair_tris[c], reach, tri, tris, x, x[i], x[j])
+        wake[c] = spent + CAREFUL * clear
+        if clear > 0.0:
+            continue
+        edge = body_edge[body]
+        found = edge_contact(
+            surface, body, edge, fresh, reach, pair_tris[c], tri, tris, x0, x, edges[pair[c][0]]
+        )
+        if found.found:
+            crossing[c] = 1
+            contact[c] = found
 
 
 @wp.kernel
 def edge_contacts(
     # in
-    fresh: bool,  # there are no overlaps from before the step
-    skin: wp.array[float],  # (n_body,) [m]
+    threads: int,
     pair: wp.array[wp.vec2i],  # (capacity,) edge and body
-    pair_tris: wp.array[wp.vec2i],  # (capacity,) first and end in ``tri``
-    tri: wp.array[int],  # (capacity,)
-    surface: wp.uint64,  # Bvh over the triangles, grouped by body
-    tris: wp.array[wp.vec3i],  # (n_tri,)
     edges: wp.array[wp.vec4i],  # (n_edge,)
     vert_body: wp.array[int],  # (n_vert,)
-    body_edge: wp.array[float],  # (n_body,) [m]
     n_hit: wp.array[int],  # (1,)
     crossing_at: wp.array[int],  # (capacity + 1,) contacts before each candidate
+    contact: wp.array[EdgeContact],  # (capacity,)
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step, for the weights
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -105,44 +99,40 @@ def edge_contacts(
     offset: wp.array[float],  # (capacity,) [m] gap = (sum coef x) . normal - offset
     pair_of: wp.array[wp.vec2i],  # (capacity,)
 ):
-    """One thread per candidate: its contact, behind those of the vertices."""
-    k = wp.tid()
-    c = n_hit[0] + crossing_at[k]
-    if crossing_at[k + 1] == crossing_at[k] or c >= normal.shape[0]:
-        return
-    e = edges[pair[k][0]]
-    i = e[0]
-    j = e[1]
-    body = pair[k][1]
-    reach = skin[vert_body[i]] + skin[body]
-    edge = body_edge[body]
-    found = edge_contact(
-        surface, body, edge, fresh, reach, pair_tris[k], tri, tris, x0, x, edges[pair[k][0]]
-    )
-    t = found.vert
-    w = found.w
-    if found.ridge:
-        su = wp.vec2(found.t, w[1])
-        start = projected_crossing(x0[i], x0[j], x0[t[0]], x0[t[1]], found.n)
-        if wp.length(start - su) < SLIP:
-            found.t = start[0]
-            w = wp.vec3(1.0 - start[1], start[1], 0.0)
-    else:
-        middle = x0[i] + found.t * (x0[j] - x0[i])
-        start_w = projected_weights(middle, found.n, x0[t[0]], x0[t[1]], x0[t[2]])
-        if wp.length(start_w - w) < SLIP:
-            w = start_w
-    vert[c, 0] = i
-    vert[c, 1] = j
-    vert[c, 2] = t[0]
-    vert[c, 3] = t[1]
-    vert[c, 4] = t[2]
-    coef[c, 0] = 1.0 - found.t
-    coef[c, 1] = found.t
-    coef[c, 2] = -w[0]
-    coef[c, 3] = -w[1]
-    coef[c, 4] = -w[2]
-    normal[c] = found.n
-    depth[c] = found.d
-    offset[c] = 0.0
-    pair_of[c] = wp.vec2i(vert_body[i], body)
+    """For each candidate: its contact, behind those of the vertices."""
+    for k in range(wp.tid(), pair.shape[0], threads):
+        c = n_hit[0] + crossing_at[k]
+        if crossing_at[k + 1] == crossing_at[k] or c >= normal.shape[0]:
+            continue
+        e = edges[pair[k][0]]
+        i = e[0]
+        j = e[1]
+        body = pair[k][1]
+        found = contact[k]
+        t = found.vert
+        w = found.w
+        if found.ridge:
+            su = wp.vec2(found.t, w[1])
+            start = projected_crossing(x0[i], x0[j], x0[t[0]], x0[t[1]], found.n)
+            if wp.length(start - su) < SLIP:
+                found.t = start[0]
+                w = wp.vec3(1.0 - start[1], start[1], 0.0)
+        else:
+            middle = x0[i] + found.t * (x0[j] - x0[i])
+            start_w = projected_weights(middle, found.n, x0[t[0]], x0[t[1]], x0[t[2]])
+            if wp.length(start_w - w) < SLIP:
+                w = start_w
+        vert[c, 0] = i
+        vert[c, 1] = j
+        vert[c, 2] = t[0]
+        vert[c, 3] = t[1]
+        vert[c, 4] = t[2]
+        coef[c, 0] = 1.0 - found.t
+        coef[c, 1] = found.t
+        coef[c, 2] = -w[0]
+        coef[c, 3] = -w[1]
+        coef[c, 4] = -w[2]
+        normal[c] = found.n
+        depth[c] = found.d
+        offset[c] = 0.0
+        pair_of[c] = wp.vec2i(vert_body[i], body)

@@ -47,9 +47,34 @@ def distance_to_faces(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3
     )
 
 
+@wp.func
+def clearance(
+    x: wp.vec3,
+    skin: float,  # [m]
+    among: wp.vec2i,
+    tet: wp.array[int],
+    tets: wp.array[wp.vec4i],
+    y: wp.array[wp.vec3],
+) -> float:
+    """A distance [m] that x keeps from the skins of all tets, not above 0 where it is in one."""
+    out = float(NONE)
+    for k in range(among[0], among[1]):
+        t = tets[tet[k]]
+        if wp.min(tet_weights(x, y[t[0]], y[t[1]], y[t[2]], y[t[3]])) >= 0.0:
+            return 0.0
+        apart = distance(x, y[t[0]], y[t[1]], y[t[2]], y[t[3]]) - skin
+        if apart < 0.0:
+            apart = distance_to_faces(x, y[t[0]], y[t[1]], y[t[2]], y[t[3]]) - skin
+            if apart <= 0.0:
+                return 0.0
+        out = wp.min(out, apart)
+    return out
+
+
 @wp.kernel
 def find_hits(
     # in
+    threads: int,
     n_pair: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,) vertex and body, n_body + p for plane p
     pair_tets: wp.array[wp.vec2i],  # (capacity,) first and end in ``tet``
@@ -65,44 +90,34 @@ def find_hits(
     # in, out
     wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no hit
     # out
-    hit: wp.array[int],  # (capacity + 1,) 1 for a hit
+    hit: wp.array[int],  # (capacity + 1,) 1 for a hit, 0 already for all others
 ):
-    """One thread per candidate, and one more for the end of the list."""
-    c = wp.tid()
-    hit[c] = 0
-    if c >= n_pair[0]:
-        return
-    i = pair[c][0]
-    body = pair[c][1]
-    spent = way[vert_body[i]] + way[body]
-    if spent < wake[c]:
-        return
-    wake[c] = -1.0
-    clear = float(NONE)
-    if body >= n_body:
-        clear = wp.dot(plane_n[body - n_body], x[i]) - plane_h[body - n_body]
-        if clear < 0.0:
+    """For each candidate."""
+    for c in range(wp.tid(), n_pair[0], threads):
+        i = pair[c][0]
+        body = pair[c][1]
+        spent = way[vert_body[i]] + way[body]
+        if spent < wake[c]:
+            continue
+        wake[c] = -1.0
+        clear = float(0.0)
+        inside = bool(False)
+        if body >= n_body:
+            clear = wp.dot(plane_n[body - n_body], x[i]) - plane_h[body - n_body]
+            inside = clear < 0.0
+        else:
+            clear = clearance(x[i], SKIN * body_edge[body], pair_tets[c], tet, tets, x)
+            inside = clear <= 0.0
+        if inside:
             hit[c] = 1
-            return
-    for k in range(pair_tets[c][0], wp.where(body < n_body, pair_tets[c][1], 0)):
-        t = tets[tet[k]]
-        if wp.min(tet_weights(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0:
-            hit[c] = 1
-            return
-        skin = SKIN * body_edge[body]
-        apart = distance(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]]) - skin
-        if apart < 0.0:
-            apart = distance_to_faces(x[i], x[t[0]], x[t[1]], x[t[2]], x[t[3]]) - skin
-            if apart <= 0.0:
-                hit[c] = 1
-                return
-        clear = wp.min(clear, apart)
-    wake[c] = spent + CAREFUL * clear
+        else:
+            wake[c] = spent + CAREFUL * clear
 
 
 @wp.kernel
 def list_hits(
     # in
+    threads: int,
     n_body: int,
     pair: wp.array[wp.vec2i],  # (capacity,)
     hit_at: wp.array[int],  # (capacity + 1,) hits before each candidate
@@ -111,16 +126,16 @@ def list_hits(
     hit_body: wp.array[int],  # (contacts,) n_body + p for plane p
     hit_layer: wp.array[int],  # (contacts,) -1: no depth yet
 ):
-    """One thread per candidate."""
-    c = wp.tid()
-    e = hit_at[c]
-    if hit_at[c + 1] == e or e >= hit_vert.shape[0]:
-        return
-    hit_vert[e] = pair[c][0]
-    hit_body[e] = pair[c][1]
-    hit_layer[e] = -1
-    if pair[c][1] >= n_body:
-        hit_layer[e] = 0
+    """For each candidate."""
+    for c in range(wp.tid(), pair.shape[0], threads):
+        e = hit_at[c]
+        if hit_at[c + 1] == e or e >= hit_vert.shape[0]:
+            continue
+        hit_vert[e] = pair[c][0]
+        hit_body[e] = pair[c][1]
+        hit_layer[e] = -1
+        if pair[c][1] >= n_body:
+            hit_layer[e] = 0
 
 
 @wp.func

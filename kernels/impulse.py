@@ -46,6 +46,7 @@ def clamped(p: wp.vec3, bound: float) -> wp.vec3:
 @wp.kernel
 def begin_contacts(
     # in
+    threads: int,
     first: wp.array[int],  # (1,) contacts before this one keep their impulses
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
@@ -67,35 +68,33 @@ def begin_contacts(
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
     ahead: wp.array[wp.vec4],  # (capacity,) [N s]
 ):
-    """One thread per contact: W, and no impulse yet on the new ones."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    w = float(0.0)
-    for k in range(5):
-        a = coef[c, k]
-        i = vert[c, k]
-        w += a * a * inv_mass[i] * float(start[i + 1] - start[i])
-    weight[c] = w
-    on_plane = pair[c][1] >= body_edge.shape[0]
-    g = gap(c, vert, coef, normal, offset, on_plane, x0)
-    closing[c] = (g - REST * body_edge[pair[c][0]]) / dt[0]
-    open[c] = g
-    largest = float(0.0)
-    for k in range(5):
-        turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
-        if w > 0.0 and not on_plane:
-            turn[c, k] = gradient(k, c, vert, normal[c], x0)
-            largest = wp.max(largest, wp.length(turn[c, k]))
-    if largest * body_edge[pair[c][0]] > STEEP:
+    """For each contact: W, and no impulse yet on the new ones."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        w = float(0.0)
+        for k in range(5):
+            a = coef[c, k]
+            i = vert[c, k]
+            w += a * a * inv_mass[i] * float(start[i + 1] - start[i])
+        weight[c] = w
+        on_plane = pair[c][1] >= body_edge.shape[0]
+        g = gap(c, vert, coef, normal, offset, on_plane, x0)
+        closing[c] = (g - REST * body_edge[pair[c][0]]) / dt[0]
+        open[c] = g
+        largest = float(0.0)
         for k in range(5):
             turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
-    if largest * wp.abs(g) > TURN or on_plane:
-        open[c] = 0.0
-    if c >= first[0]:
-        lam[c] = 0.0
-        slip[c] = wp.vec3(0.0, 0.0, 0.0)
-        ahead[c] = wp.vec4(0.0, 0.0, 0.0, 0.0)
+            if w > 0.0 and not on_plane:
+                turn[c, k] = gradient(k, c, vert, normal[c], x0)
+                largest = wp.max(largest, wp.length(turn[c, k]))
+        if largest * body_edge[pair[c][0]] > STEEP:
+            for k in range(5):
+                turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
+        if largest * wp.abs(g) > TURN or on_plane:
+            open[c] = 0.0
+        if c >= first[0]:
+            lam[c] = 0.0
+            slip[c] = wp.vec3(0.0, 0.0, 0.0)
+            ahead[c] = wp.vec4(0.0, 0.0, 0.0, 0.0)
 
 
 @wp.kernel
@@ -113,6 +112,7 @@ def next_sweep(
 @wp.kernel
 def solve_contacts(
     # in
+    threads: int,
     mu: float,
     tolerance: float,  # of an edge: approach in a step that needs another sweep
     sweeps: int,  # at most
@@ -139,50 +139,49 @@ def solve_contacts(
     # out, added to
     again: wp.array[int],  # (1,) 1 when another sweep is needed
 ):
-    """One thread per contact: update its accumulated impulses."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    if weight[c] == 0.0:
+    """For each contact: update its accumulated impulses."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        if weight[c] == 0.0:
+            for k in range(5):
+                part[5 * c + k] = wp.vec3(0.0, 0.0, 0.0)
+            continue
+        n = normal[c]
+        u = wp.vec3(0.0, 0.0, 0.0)
         for k in range(5):
-            part[5 * c + k] = wp.vec3(0.0, 0.0, 0.0)
-        return
-    n = normal[c]
-    u = wp.vec3(0.0, 0.0, 0.0)
-    for k in range(5):
-        w = v[vert[c, k]]
-        u += coef[c, k] * w
+            w = v[vert[c, k]]
+            u += coef[c, k] * w
+            if mu > 0.0:
+                u += open[c] * wp.dot(n, w) * turn[c, k]
+        un = wp.dot(u, n)
+        excess = un + wp.max(closing[c], 0.0)
+        y = ahead[c]
+        yt = wp.vec3(y[0], y[1], y[2])
+        new_lam = wp.max(y[3] - excess / weight[c], 0.0)
+        off = wp.abs(new_lam - y[3]) * weight[c]
+        if off * dt[0] > tolerance * body_edge[pair[c][0]] and done[0] < sweeps:
+            again[0] = 1
+        new_slip = wp.vec3(0.0, 0.0, 0.0)
         if mu > 0.0:
-            u += open[c] * wp.dot(n, w) * turn[c, k]
-    un = wp.dot(u, n)
-    excess = un + wp.max(closing[c], 0.0)
-    y = ahead[c]
-    yt = wp.vec3(y[0], y[1], y[2])
-    new_lam = wp.max(y[3] - excess / weight[c], 0.0)
-    off = wp.abs(new_lam - y[3]) * weight[c]
-    if off * dt[0] > tolerance * body_edge[pair[c][0]] and done[0] < sweeps:
-        again[0] = 1
-    new_slip = wp.vec3(0.0, 0.0, 0.0)
-    if mu > 0.0:
-        new_slip = clamped(yt - (u - un * n) / weight[c], mu * new_lam)
-    beta = float(0.0)
-    if not last:
-        beta = float(done[0] - 1) / float(done[0] + 2)
-    if (y[3] - new_lam) * (new_lam - lam[c]) > 0.0:
-        beta = 0.0
-    next_lam = new_lam + beta * (new_lam - lam[c])
-    next_slip = new_slip + beta * (new_slip - slip[c])
-    change = (next_lam - y[3]) * n + next_slip - yt
-    for k in range(5):
-        part[5 * c + k] = coef[c, k] * change + open[c] * wp.dot(turn[c, k], change) * n
-    ahead[c] = wp.vec4(next_slip[0], next_slip[1], next_slip[2], next_lam)
-    lam[c] = new_lam
-    slip[c] = new_slip
+            new_slip = clamped(yt - (u - un * n) / weight[c], mu * new_lam)
+        beta = float(0.0)
+        if not last:
+            beta = float(done[0] - 1) / float(done[0] + 2)
+        if (y[3] - new_lam) * (new_lam - lam[c]) > 0.0:
+            beta = 0.0
+        next_lam = new_lam + beta * (new_lam - lam[c])
+        next_slip = new_slip + beta * (new_slip - slip[c])
+        change = (next_lam - y[3]) * n + next_slip - yt
+        for k in range(5):
+            part[5 * c + k] = coef[c, k] * change + open[c] * wp.dot(turn[c, k], change) * n
+        ahead[c] = wp.vec4(next_slip[0], next_slip[1], next_slip[2], next_lam)
+        lam[c] = new_lam
+        slip[c] = new_slip
 
 
 @wp.kernel
 def apply_impulses(
     # in
+    threads: int,
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
     part: wp.array[wp.vec3],  # (5 capacity,) [N s]
@@ -191,12 +190,12 @@ def apply_impulses(
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     impulse: wp.array[wp.vec3],  # (n_vert,) [N s] received since the frame began
 ):
-    """One thread per vertex: gather the impulses of its contacts in their order."""
-    i = wp.tid()
-    if start[i] == start[i + 1]:
-        return
-    p = wp.vec3(0.0, 0.0, 0.0)
-    for e in range(start[i], start[i + 1]):
-        p += part[entry[e]]
-    v[i] = v[i] + inv_mass[i] * p
-    impulse[i] = impulse[i] + p
+    """For each vertex: gather the impulses of its contacts in their order."""
+    for i in range(wp.tid(), v.shape[0], threads):
+        if start[i] == start[i + 1]:
+            continue
+        p = wp.vec3(0.0, 0.0, 0.0)
+        for e in range(start[i], start[i + 1]):
+            p += part[entry[e]]
+        v[i] = v[i] + inv_mass[i] * p
+        impulse[i] = impulse[i] + p

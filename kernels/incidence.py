@@ -6,6 +6,8 @@ part of a couple.
 
 import warp as wp
 
+from warp_contact.kernels.sorting import sort
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -42,24 +44,24 @@ def total_contacts(
 @wp.kernel
 def count_entries(
     # in
+    threads: int,
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
     # out, added to
     count: wp.array[int],  # (n_vert + 1,)
 ):
-    """One thread per contact."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    for k in range(5):
-        if takes_part(c, k, vert, coef):
-            wp.atomic_add(count, vert[c, k], 1)
+    """For each contact."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        for k in range(5):
+            if takes_part(c, k, vert, coef):
+                wp.atomic_add(count, vert[c, k], 1)
 
 
 @wp.kernel
 def fill_entries(
     # in
+    threads: int,
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -68,37 +70,30 @@ def fill_entries(
     # out
     entry: wp.array[int],  # (5 capacity,)
 ):
-    """One thread per contact: write its entries, from the end of each list downwards."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    for k in range(5):
-        if takes_part(c, k, vert, coef):
-            entry[wp.atomic_sub(start, vert[c, k], 1) - 1] = 5 * c + k
+    """For each contact: write its entries, from the end of each list downwards."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        for k in range(5):
+            if takes_part(c, k, vert, coef):
+                entry[wp.atomic_sub(start, vert[c, k], 1) - 1] = 5 * c + k
 
 
 @wp.kernel
 def sort_entries(
     # in
+    threads: int,
     start: wp.array[int],  # (n_vert + 1,)
     # in, out
     entry: wp.array[int],  # (5 capacity,)
 ):
-    """One thread per vertex: sort its list, which is short."""
-    i = wp.tid()
-    first = start[i]
-    for e in range(first + 1, start[i + 1]):
-        value = entry[e]
-        k = int(e)
-        while k > first and entry[wp.max(k - 1, 0)] > value:
-            entry[k] = entry[k - 1]
-            k -= 1
-        entry[k] = value
+    """For each vertex: sort its list, which is short."""
+    for i in range(wp.tid(), start.shape[0] - 1, threads):
+        sort(entry, start[i], start[i + 1])
 
 
 @wp.kernel
 def add_parts(
     # in
+    threads: int,
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
     part: wp.array[wp.vec3],  # (5 capacity,) [kg y]
@@ -106,11 +101,11 @@ def add_parts(
     # in, out
     y: wp.array[wp.vec3],  # (n_vert,) positions or velocities
 ):
-    """One thread per vertex: gather the parts of its contacts in their order."""
-    i = wp.tid()
-    if start[i] == start[i + 1] or inv_mass[i] == 0.0:
-        return
-    p = wp.vec3(0.0, 0.0, 0.0)
-    for e in range(start[i], start[i + 1]):
-        p += part[entry[e]]
-    y[i] = y[i] + inv_mass[i] * p
+    """For each vertex: gather the parts of its contacts in their order."""
+    for i in range(wp.tid(), y.shape[0], threads):
+        if start[i] == start[i + 1] or inv_mass[i] == 0.0:
+            continue
+        p = wp.vec3(0.0, 0.0, 0.0)
+        for e in range(start[i], start[i + 1]):
+            p += part[entry[e]]
+        y[i] = y[i] + inv_mass[i] * p

@@ -119,8 +119,13 @@ def relax(
 
 @wp.kernel
 def count_down(
+    # in
+    needed: wp.array[int],  # what did not fit in its buffer, 0 where all did
     # in, out
-    steps: wp.array[int],  # (1,) steps that the frame still has
+    steps: wp.array[int],  # (1,) steps that the frame still has: none when it has to be repeated
 ):
     """One thread, at the end of a step."""
     steps[0] = steps[0] - 1
+    for k in range(needed.shape[0]):
+        if needed[k] > 0:
+            steps[0] = 0

@@ -9,31 +9,21 @@ import warp as wp
 wp.set_module_options({"enable_backward": False})
 
 
-@wp.kernel
-def add_pair_impulses(
-    # in
-    unit: float,  # momentum of one count [N s]
-    first: wp.array[int],  # (1,)
-    end: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    lam: wp.array[float],  # (capacity,) [N s]
-    slip: wp.array[wp.vec3],  # (capacity,) [N s]
-    # in, out
-    key: wp.array[wp.int64],  # (n_pair,) lower body * 2^32 + upper body, -1 where free
-    total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
-    needed: wp.array[int],  # (1,) pairs that would have been enough
-):
-    """One thread per contact: add those from the first to the end to their pairs, as integers."""
-    c = wp.tid()
-    if c < first[0] or c >= end[0] or lam[c] <= 0.0:
-        return
-    p = lam[c] * normal[c] + slip[c]
-    lo = pair[c][0]
-    hi = pair[c][1]
+@wp.func
+def add(
+    pair: wp.vec2i,
+    impulse: wp.vec3,  # [N s] on the first body
+    unit: float,  # [N s]
+    key: wp.array[wp.int64],
+    total: wp.array2d[wp.int64],
+) -> bool:
+    """Add an impulse to its pair of bodies; False when the table has no room for the pair."""
+    p = impulse
+    lo = pair[0]
+    hi = pair[1]
     if lo > hi:
-        lo = pair[c][1]
-        hi = pair[c][0]
+        lo = pair[1]
+        hi = pair[0]
         p = -p
     name = (wp.int64(lo) << wp.int64(32)) | wp.int64(hi)
     n = key.shape[0]
@@ -47,6 +37,29 @@ def add_pair_impulses(
                 wp.atomic_add(
                     total, slot, k, wp.int64(wp.round(wp.float64(p[k]) / wp.float64(unit)))
                 )
-            return
+            return True
         slot = (slot + 1) % n
-    wp.atomic_max(needed, 0, n + 1)
+    return False
+
+
+@wp.kernel
+def add_pair_impulses(
+    # in
+    threads: int,
+    unit: float,  # momentum of one count [N s]
+    first: wp.array[int],  # (1,)
+    end: wp.array[int],  # (1,)
+    pair: wp.array[wp.vec2i],  # (capacity,)
+    normal: wp.array[wp.vec3],  # (capacity,)
+    lam: wp.array[float],  # (capacity,) [N s]
+    slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    # in, out
+    key: wp.array[wp.int64],  # (n_pair,) lower body * 2^32 + upper body, -1 where free
+    total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
+    needed: wp.array[int],  # (1,) pairs that would have been enough
+):
+    """For each contact: add those from the first to the end to their pairs, as integers."""
+    for c in range(first[0] + wp.tid(), wp.min(end[0], lam.shape[0]), threads):
+        p = lam[c] * normal[c] + slip[c]
+        if lam[c] > 0.0 and not add(pair[c], p, unit, key, total):
+            wp.atomic_max(needed, 0, key.shape[0] + 1)

@@ -6,6 +6,8 @@ leave no trace of that order. Items are numbered by body, so that those of a pai
 
 import warp as wp
 
+from warp_contact.kernels.sorting import sort
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -20,23 +22,25 @@ def append(owner: int, item: int, found: wp.array[wp.vec2i], n_found: wp.array[i
 @wp.kernel
 def count_items(
     # in
+    threads: int,
     n_found: wp.array[int],  # (1,)
     found: wp.array[wp.vec2i],  # (capacity,) owner and item
     # out, added to
     count: wp.array[int],  # (n_owner + 1,)
     needed: wp.array[int],  # (1,) largest number of items that did not fit
 ):
-    """One thread per item; none is counted when they do not fit."""
-    k = wp.tid()
+    """For each item; none is counted when they do not fit."""
     if n_found[0] > found.shape[0]:
         wp.atomic_max(needed, 0, n_found[0])
-    elif k < n_found[0]:
+        return
+    for k in range(wp.tid(), n_found[0], threads):
         wp.atomic_add(count, found[k][0], 1)
 
 
 @wp.kernel
 def fill_items(
     # in
+    threads: int,
     n_found: wp.array[int],  # (1,)
     found: wp.array[wp.vec2i],  # (capacity,)
     # in, out
@@ -44,15 +48,18 @@ def fill_items(
     # out
     item: wp.array[int],  # (capacity,) by owner, unsorted
 ):
-    """One thread per item."""
-    k = wp.tid()
-    if k < n_found[0] and n_found[0] <= found.shape[0]:
+    """For each item."""
+    if n_found[0] > found.shape[0]:
+        return
+    for e in range(wp.tid(), n_found[0], threads):
+        k = n_found[0] - 1 - e  # lists are filled from their ends
         item[wp.atomic_sub(start, found[k][0], 1) - 1] = found[k][1]
 
 
 @wp.kernel
 def count_pairs(
     # in
+    threads: int,
     item_body: wp.array[int],  # (n,)
     start: wp.array[int],  # (n_owner + 1,)
     # in, out
@@ -60,27 +67,22 @@ def count_pairs(
     # out
     count: wp.array[int],  # (n_owner + 1,)
 ):
-    """One thread per owner: sort its items and count their bodies."""
-    i = wp.tid()
-    n = int(0)
-    body = int(-1)
-    for e in range(start[i], start[i + 1]):
-        value = item[e]
-        k = int(e)
-        while k > start[i] and item[wp.max(k - 1, 0)] > value:
-            item[k] = item[k - 1]
-            k -= 1
-        item[k] = value
-    for e in range(start[i], start[i + 1]):
-        if item_body[item[e]] != body:
-            body = item_body[item[e]]
-            n += 1
-    count[i] = n
+    """For each owner: sort its items and count their bodies."""
+    for i in range(wp.tid(), start.shape[0] - 1, threads):
+        n = int(0)
+        body = int(-1)
+        sort(item, start[i], start[i + 1])
+        for e in range(start[i], start[i + 1]):
+            if item_body[item[e]] != body:
+                body = item_body[item[e]]
+                n += 1
+        count[i] = n
 
 
 @wp.kernel
 def list_pairs(
     # in
+    threads: int,
     item_body: wp.array[int],  # (n,)
     start: wp.array[int],  # (n_owner + 1,)
     item: wp.array[int],  # (capacity,)
@@ -92,25 +94,25 @@ def list_pairs(
     # out, added to
     needed: wp.array[int],  # (1,) largest number of pairs that did not fit
 ):
-    """One thread per owner: its pairs, bodies in ascending order."""
-    i = wp.tid()
+    """For each owner: its pairs, bodies in ascending order."""
     total = pair_start[pair_start.shape[0] - 1]
     if total > pair.shape[0]:
         n_pair[0] = 0
         wp.atomic_max(needed, 0, total)
         return
     n_pair[0] = total
-    c = pair_start[i]
-    first = start[i]
-    while first < start[i + 1]:
-        body = item_body[item[first]]
-        end = int(first)
-        while end < start[i + 1] and item_body[item[wp.min(end, item.shape[0] - 1)]] == body:
-            end += 1
-        pair[c] = wp.vec2i(i, body)
-        items[c] = wp.vec2i(first, end)
-        c += 1
-        first = end
+    for i in range(wp.tid(), start.shape[0] - 1, threads):
+        c = pair_start[i]
+        first = start[i]
+        while first < start[i + 1]:
+            body = item_body[item[first]]
+            end = int(first)
+            while end < start[i + 1] and item_body[item[wp.min(end, item.shape[0] - 1)]] == body:
+                end += 1
+            pair[c] = wp.vec2i(i, body)
+            items[c] = wp.vec2i(first, end)
+            c += 1
+            first = end
 
 
 @wp.kernel

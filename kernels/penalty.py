@@ -15,6 +15,7 @@ wp.set_module_options({"enable_backward": False})
 @wp.kernel
 def penalty_impulses(
     # in
+    threads: int,
     stiffness: float,  # [N/m]
     damping: float,  # [N s/m]
     mu: float,
@@ -33,12 +34,10 @@ def penalty_impulses(
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] its part at each vertex
 ):
-    """One thread per contact: the impulse of the penalty force over one step."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    u = relative_velocity(c, vert, coef, v)
-    p = float(0.0)
-    if weight[c] > 0.0 and depth[c] > 0.0:
-        p = dt[0] * wp.max(stiffness * depth[c] - damping * wp.dot(u, normal[c]), 0.0)
-    give(c, p, u, mu, coef, normal, weight, open, turn, lam, slip, part)
+    """For each contact: the impulse of the penalty force over one step."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        u = relative_velocity(c, vert, coef, v)
+        p = float(0.0)
+        if weight[c] > 0.0 and depth[c] > 0.0:
+            p = dt[0] * wp.max(stiffness * depth[c] - damping * wp.dot(u, normal[c]), 0.0)
+        give(c, p, u, mu, coef, normal, weight, open, turn, lam, slip, part)

@@ -31,6 +31,7 @@ GRAZING = wp.constant(5.0e-3)  # sine below which a tet edge lies in a wall and 
 @wp.kernel
 def border_depth(
     # in
+    threads: int,
     n_body: int,
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
     tris: wp.array[wp.vec3i],  # (n_tri,)
@@ -50,38 +51,36 @@ def border_depth(
     # out, added to
     pending: wp.array[int],  # (1,) 1 when some hit has no depth yet
 ):
-    """One thread per hit: depth and direction from the crossing tet edges."""
-    e = wp.tid()
-    if e >= wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]):
-        return
-    i = hit_vert[e]
-    body = hit_body[e]
-    if body >= n_body:
-        return
-    p = x[i]
-    weight = float(0.0)
-    depth = float(0.0)
-    r = wp.vec3(0.0, 0.0, 0.0)
-    for k in range(vn_start[i], vn_start[i + 1]):
-        j = vn_vert[k]
-        if not is_hit(j, body, pair_start, hit_at, hit_body):
-            u = p - x[j]
-            hit = first_hit(surface, body, tris, x, x[j], u, -1.0e-6, -1.0, GRAZING)
-            if hit.tri >= 0:
-                n = hit_normal(hit, tris, vs_start, vs_tri, x)
-                gap = hit_point(hit, tris, x) - p
-                d = wp.dot(gap, n)
-                if d > 0.0 and opposes(looks(i, n, tris, vs_start, vs_tri, x)):
-                    w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-12 * wp.length_sq(u))
-                    weight += w
-                    depth += w * d
-                    r += w * n
-    if weight > 0.0 and wp.length_sq(r) > 1.0e-6 * weight * weight:
-        hit_depth[e] = depth / weight
-        hit_dir[e] = wp.normalize(r)
-        hit_layer[e] = 0
-    else:
-        pending[0] = 1
+    """For each hit: depth and direction from the crossing tet edges."""
+    for e in range(wp.tid(), wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]), threads):
+        i = hit_vert[e]
+        body = hit_body[e]
+        if body >= n_body:
+            continue
+        p = x[i]
+        weight = float(0.0)
+        depth = float(0.0)
+        r = wp.vec3(0.0, 0.0, 0.0)
+        for k in range(vn_start[i], vn_start[i + 1]):
+            j = vn_vert[k]
+            if not is_hit(j, body, pair_start, hit_at, hit_body):
+                u = p - x[j]
+                hit = first_hit(surface, body, tris, x, x[j], u, -1.0e-6, -1.0, GRAZING)
+                if hit.tri >= 0:
+                    n = hit_normal(hit, tris, vs_start, vs_tri, x)
+                    gap = hit_point(hit, tris, x) - p
+                    d = wp.dot(gap, n)
+                    if d > 0.0 and opposes(looks(i, n, tris, vs_start, vs_tri, x)):
+                        w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-12 * wp.length_sq(u))
+                        weight += w
+                        depth += w * d
+                        r += w * n
+        if weight > 0.0 and wp.length_sq(r) > 1.0e-6 * weight * weight:
+            hit_depth[e] = depth / weight
+            hit_dir[e] = wp.normalize(r)
+            hit_layer[e] = 0
+        else:
+            pending[0] = 1
 
 
 @wp.kernel
@@ -98,6 +97,7 @@ def begin_layer(
 @wp.kernel
 def propagate(
     # in
+    threads: int,
     n_body: int,
     layer: wp.array[int],  # (1,)
     vn_start: wp.array[int],  # (n_vert + 1,)
@@ -113,26 +113,26 @@ def propagate(
     hit_layer: wp.array[int],  # (capacity,)
     pending: wp.array[int],  # (1,) 1 when this layer filled a hit
 ):
-    """One thread per hit without depth: take it over from neighbours of earlier layers."""
-    e = wp.tid()
-    if e >= wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]) or hit_layer[e] >= 0:
-        return
-    i = hit_vert[e]
-    weight = float(0.0)
-    depth = float(0.0)
-    r = wp.vec3(0.0, 0.0, 0.0)
-    for k in range(vn_start[i], vn_start[i + 1]):
-        j = vn_vert[k]
-        around = hit_range(j, pair_start, hit_at, hit_vert.shape[0])
-        for f in range(around[0], around[1]):
-            if hit_body[f] == hit_body[e] and hit_layer[f] >= 0 and hit_layer[f] < layer[0]:
-                gap = x[j] - x[i]
-                w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-20)
-                weight += w
-                depth += w * (wp.dot(gap, hit_dir[f]) + hit_depth[f])
-                r += w * hit_dir[f]
-    if weight > 0.0 and wp.length_sq(r) > 1.0e-6 * weight * weight:
-        hit_depth[e] = depth / weight
-        hit_dir[e] = wp.normalize(r)
-        hit_layer[e] = layer[0]
-        pending[0] = 1
+    """For each hit without depth: take it over from neighbours of earlier layers."""
+    for e in range(wp.tid(), wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]), threads):
+        if hit_layer[e] >= 0:
+            continue
+        i = hit_vert[e]
+        weight = float(0.0)
+        depth = float(0.0)
+        r = wp.vec3(0.0, 0.0, 0.0)
+        for k in range(vn_start[i], vn_start[i + 1]):
+            j = vn_vert[k]
+            around = hit_range(j, pair_start, hit_at, hit_vert.shape[0])
+            for f in range(around[0], around[1]):
+                if hit_body[f] == hit_body[e] and hit_layer[f] >= 0 and hit_layer[f] < layer[0]:
+                    gap = x[j] - x[i]
+                    w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-20)
+                    weight += w
+                    depth += w * (wp.dot(gap, hit_dir[f]) + hit_depth[f])
+                    r += w * hit_dir[f]
+        if weight > 0.0 and wp.length_sq(r) > 1.0e-6 * weight * weight:
+            hit_depth[e] = depth / weight
+            hit_dir[e] = wp.normalize(r)
+            hit_layer[e] = layer[0]
+            pending[0] = 1

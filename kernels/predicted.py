@@ -23,6 +23,7 @@ wp.set_module_options({"enable_backward": False})
 @wp.kernel
 def predicted_impulses(
     # in
+    threads: int,
     n_body: int,
     mu: float,
     dt: wp.array[float],  # (1,) [s]
@@ -42,13 +43,11 @@ def predicted_impulses(
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] its part at each vertex
 ):
-    """One thread per contact: the impulse of the predicted force over one step."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    p = float(0.0)
-    if weight[c] > 0.0:
-        g = gap(c, vert, coef, normal, offset, pair[c][1] >= n_body, x)
-        p = wp.max(-g, 0.0) / (dt[0] * weight[c])
-    u = relative_velocity(c, vert, coef, v)
-    give(c, p, u, mu, coef, normal, weight, open, turn, lam, slip, part)
+    """For each contact: the impulse of the predicted force over one step."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        p = float(0.0)
+        if weight[c] > 0.0:
+            g = gap(c, vert, coef, normal, offset, pair[c][1] >= n_body, x)
+            p = wp.max(-g, 0.0) / (dt[0] * weight[c])
+        u = relative_velocity(c, vert, coef, v)
+        give(c, p, u, mu, coef, normal, weight, open, turn, lam, slip, part)

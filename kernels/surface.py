@@ -116,6 +116,7 @@ def stiffnesses(
 @wp.kernel
 def side_means(
     # in
+    threads: int,
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -127,27 +128,25 @@ def side_means(
     upper: wp.array[wp.vec3],  # (capacity,) (traction, stiffness, fraction), side along n
     lower: wp.array[wp.vec3],  # (capacity,) the same of the other side
 ):
-    """One thread per contact: interpolate both sides to the contact point."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    up = wp.vec3(0.0, 0.0, 0.0)
-    lo = wp.vec3(0.0, 0.0, 0.0)
-    up_weight = float(0.0)
-    lo_weight = float(0.0)
-    for k in range(5):
-        i = vert[c, k]
-        w = wp.abs(coef[c, k])
-        if w > 0.0 and wp.length_sq(s[i]) > 0.0:
-            value = wp.vec3(traction[i], stiffness[i], fraction[i])
-            if k < 2:
-                up += w * value
-                up_weight += w
-            else:
-                lo += w * value
-                lo_weight += w
-    upper[c] = up / up_weight if up_weight > 0.0 else wp.vec3(0.0, 0.0, RIGID)
-    lower[c] = lo / lo_weight if lo_weight > 0.0 else wp.vec3(0.0, 0.0, RIGID)
+    """For each contact: interpolate both sides to the contact point."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        up = wp.vec3(0.0, 0.0, 0.0)
+        lo = wp.vec3(0.0, 0.0, 0.0)
+        up_weight = float(0.0)
+        lo_weight = float(0.0)
+        for k in range(5):
+            i = vert[c, k]
+            w = wp.abs(coef[c, k])
+            if w > 0.0 and wp.length_sq(s[i]) > 0.0:
+                value = wp.vec3(traction[i], stiffness[i], fraction[i])
+                if k < 2:
+                    up += w * value
+                    up_weight += w
+                else:
+                    lo += w * value
+                    lo_weight += w
+        upper[c] = up / up_weight if up_weight > 0.0 else wp.vec3(0.0, 0.0, RIGID)
+        lower[c] = lo / lo_weight if lo_weight > 0.0 else wp.vec3(0.0, 0.0, RIGID)
 
 
 @wp.func

@@ -121,6 +121,7 @@ def closest_contact(
 @wp.kernel
 def vertex_contacts(
     # in
+    threads: int,
     n_body: int,
     fresh: bool,  # there are no overlaps from before the step
     surface: wp.uint64,  # Bvh over the triangles, grouped by body
@@ -148,48 +149,46 @@ def vertex_contacts(
     offset: wp.array[float],  # (capacity,) [m] gap = (sum coef x) . normal - offset
     pair: wp.array[wp.vec2i],  # (capacity,)
 ):
-    """One thread per hit: contact c = hit e of a surface vertex with a triangle or a plane."""
-    e = wp.tid()
-    if e >= wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]):
-        return
-    i = hit_vert[e]
-    body = hit_body[e]
-    for k in range(5):
-        vert[e, k] = i
-        coef[e, k] = 0.0
-    depth[e] = 0.0
-    offset[e] = 0.0
-    normal[e] = wp.vec3(0.0, 0.0, 0.0)
-    pair[e] = wp.vec2i(vert_body[i], body)
-    if body >= n_body:
-        n = plane_n[body - n_body]
+    """For each hit: contact c = hit e of a surface vertex with a triangle or a plane."""
+    for e in range(wp.tid(), wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]), threads):
+        i = hit_vert[e]
+        body = hit_body[e]
+        for k in range(5):
+            vert[e, k] = i
+            coef[e, k] = 0.0
+        depth[e] = 0.0
+        offset[e] = 0.0
+        normal[e] = wp.vec3(0.0, 0.0, 0.0)
+        pair[e] = wp.vec2i(vert_body[i], body)
+        if body >= n_body:
+            n = plane_n[body - n_body]
+            coef[e, 0] = 1.0
+            normal[e] = n
+            offset[e] = plane_h[body - n_body]
+            depth[e] = offset[e] - wp.dot(n, x[i])
+            continue
+        if on_surface[i] == 0:
+            continue
+        out = inner_contact(
+            surface, body, tris, x0, x, i, hit_layer[e], hit_depth[e], hit_dir[e], body_edge[body]
+        )
+        if not out.found or (fresh and out.start < -STALE * body_edge[body]):
+            near = closest_contact(surface, body, tris, vs_start, vs_tri, x0, x, i, body_edge[body])
+            if near.found and not (out.found and out.start >= near.start):
+                out = near
+        if not out.found:
+            continue
+        t = tris[out.hit.tri]
+        r = out.n
+        w = projected_weights(x0[i], r, x0[t[0]], x0[t[1]], x0[t[2]])
+        if wp.length(w - out.hit.w) > SLIP:
+            w = out.hit.w
+        vert[e, 2] = t[0]
+        vert[e, 3] = t[1]
+        vert[e, 4] = t[2]
         coef[e, 0] = 1.0
-        normal[e] = n
-        offset[e] = plane_h[body - n_body]
-        depth[e] = offset[e] - wp.dot(n, x[i])
-        return
-    if on_surface[i] == 0:
-        return
-    out = inner_contact(
-        surface, body, tris, x0, x, i, hit_layer[e], hit_depth[e], hit_dir[e], body_edge[body]
-    )
-    if not out.found or (fresh and out.start < -STALE * body_edge[body]):
-        near = closest_contact(surface, body, tris, vs_start, vs_tri, x0, x, i, body_edge[body])
-        if near.found and not (out.found and out.start >= near.start):
-            out = near
-    if not out.found:
-        return
-    t = tris[out.hit.tri]
-    r = out.n
-    w = projected_weights(x0[i], r, x0[t[0]], x0[t[1]], x0[t[2]])
-    if wp.length(w - out.hit.w) > SLIP:
-        w = out.hit.w
-    vert[e, 2] = t[0]
-    vert[e, 3] = t[1]
-    vert[e, 4] = t[2]
-    coef[e, 0] = 1.0
-    coef[e, 2] = -w[0]
-    coef[e, 3] = -w[1]
-    coef[e, 4] = -w[2]
-    normal[e] = r
-    depth[e] = wp.dot(hit_point(out.hit, tris, x) - x[i], r)
+        coef[e, 2] = -w[0]
+        coef[e, 3] = -w[1]
+        coef[e, 4] = -w[2]
+        normal[e] = r
+        depth[e] = wp.dot(hit_point(out.hit, tris, x) - x[i], r)

@@ -21,6 +21,7 @@ def is_first(c: int, n_hit: int, vert: wp.array2d[int]) -> bool:
 @wp.kernel
 def recall(
     # in
+    threads: int,
     mu: float,
     n_hit: wp.array[int],  # (1,)
     n_contact: wp.array[int],  # (1,)
@@ -39,28 +40,27 @@ def recall(
     ahead: wp.array[wp.vec4],  # (capacity,) [N s]
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] what they are at each vertex
 ):
-    """One thread per contact."""
-    c = wp.tid()
-    if c >= n_contact[0]:
-        return
-    p = wp.vec3(0.0, 0.0, 0.0)
-    n = normal[c]
-    i = vert[c, 0]
-    if weight[c] > 0.0 and is_first(c, n_hit[0], vert) and partner[i] == pair[c][1]:
-        old = kept[i]
-        rubbed = wp.vec3(old[0], old[1], old[2])
-        rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu * old[3])
-        lam[c] = old[3]
-        slip[c] = rubbed
-        ahead[c] = wp.vec4(rubbed[0], rubbed[1], rubbed[2], old[3])
-        p = old[3] * n + rubbed
-    for k in range(5):
-        part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n
+    """For each contact."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        p = wp.vec3(0.0, 0.0, 0.0)
+        n = normal[c]
+        i = vert[c, 0]
+        if weight[c] > 0.0 and is_first(c, n_hit[0], vert) and partner[i] == pair[c][1]:
+            old = kept[i]
+            rubbed = wp.vec3(old[0], old[1], old[2])
+            rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu * old[3])
+            lam[c] = old[3]
+            slip[c] = rubbed
+            ahead[c] = wp.vec4(rubbed[0], rubbed[1], rubbed[2], old[3])
+            p = old[3] * n + rubbed
+        for k in range(5):
+            part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n
 
 
 @wp.kernel
 def keep(
     # in
+    threads: int,
     n_hit: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     pair: wp.array[wp.vec2i],  # (capacity,)
@@ -70,8 +70,9 @@ def keep(
     partner: wp.array[int],  # (n_vert,)
     kept: wp.array[wp.vec4],  # (n_vert,) [N s]
 ):
-    """One thread per contact of a vertex."""
-    c = wp.tid()
-    if is_first(c, wp.min(n_hit[0], lam.shape[0]), vert):
-        partner[vert[c, 0]] = pair[c][1]
-        kept[vert[c, 0]] = wp.vec4(slip[c][0], slip[c][1], slip[c][2], lam[c])
+    """For each contact of a vertex."""
+    n = wp.min(n_hit[0], lam.shape[0])
+    for c in range(wp.tid(), n, threads):
+        if is_first(c, n, vert):
+            partner[vert[c, 0]] = pair[c][1]
+            kept[vert[c, 0]] = wp.vec4(slip[c][0], slip[c][1], slip[c][2], lam[c])

@@ -1,4 +1,4 @@
-"""kernels/raycast.py and warp_contact/render.py: silhouettes, colours, shadows, files."""
+"""raycast.py, render.py and pictures.py: silhouettes, colours, shadows, files."""
 
 import struct
 import sys
@@ -9,9 +9,10 @@ import pytest
 import warp as wp
 from pxr import Usd, UsdGeom
 
-from warp_contact import render
-from warp_contact.kernels import raycast
-from warp_contact.render import Camera, Renderer
+from warp_contact import pictures, render
+from warp_contact.kernels.raycast import screen
+from warp_contact.raycast import Camera, Renderer
+from warp_contact.usd_scene import linear
 
 RED = np.array([0.6, 0.02, 0.02])
 
@@ -119,7 +120,7 @@ def test_a_body_darkens_the_ground_below_it():
 def test_screen_is_the_inverse_of_linear():
     for code in ("000000", "0a141e", "4c86b8", "ffffff"):
         expected = np.frombuffer(bytes.fromhex(code), np.uint8) / 255.0
-        values = [raycast.screen(float(c)) for c in render.linear(code)]
+        values = [screen(float(c)) for c in linear(code)]
         np.testing.assert_allclose(values, expected, atol=1e-5)
 
 
@@ -162,9 +163,9 @@ def test_png_needs_no_library(tmp_path, monkeypatch):
     picture = np.random.default_rng(3).integers(0, 256, (7, 5, 3)).astype(np.uint8)
     with monkeypatch.context() as patch:
         patch.setitem(sys.modules, "PIL", None)
-        render.write_png(tmp_path / "own.png", picture)
+        pictures.write_png(tmp_path / "own.png", picture)
         with pytest.raises(ImportError, match="Pillow"):
-            render.animate([tmp_path / "own.png"], tmp_path / "a.webp")
+            pictures.animate([tmp_path / "own.png"], tmp_path / "a.webp")
     np.testing.assert_array_equal(pixels(tmp_path / "own.png"), picture)
     data = (tmp_path / "own.png").read_bytes()
     assert struct.unpack(">II", data[16:24]) == (5, 7)
@@ -176,7 +177,7 @@ def test_png_needs_no_library(tmp_path, monkeypatch):
 def test_animations_hold_every_picture(tmp_path, kind):
     image = pytest.importorskip("PIL.Image")
     for k in range(3):
-        render.write_png(tmp_path / f"{k}.png", np.full((8, 8, 3), 80 * k, np.uint8))
-    render.animate(sorted(tmp_path.glob("*.png")), tmp_path / f"all.{kind}", 25.0)
+        pictures.write_png(tmp_path / f"{k}.png", np.full((8, 8, 3), 80 * k, np.uint8))
+    pictures.animate(sorted(tmp_path.glob("*.png")), tmp_path / f"all.{kind}", 25.0)
     with image.open(tmp_path / f"all.{kind}") as animation:
         assert animation.n_frames == 3

@@ -4,6 +4,7 @@ import warp as wp
 
 from warp_contact.kernels import candidates, hashing, near
 from warp_contact.kernels import pairs as kernels
+from warp_contact.launch import launch_over
 from warp_contact.types import Model, Pairs
 from warp_contact.work import Work, launch_body_boxes, launch_triangle_boxes
 
@@ -173,29 +174,29 @@ def _by_pair(
     """Sort the items found by owner and body; ``needed`` is that of the pairs and the items."""
     n_owner = pairs.start.shape[0] - 1
     pairs.item_start.zero_()
-    wp.launch(
+    launch_over(
         kernels.count_items,
-        dim=found.shape[0],
+        found.shape[0],
         inputs=[n_found, found],
         outputs=[pairs.item_start, needed[1:2]],
     )
     wp.utils.array_scan(pairs.item_start, pairs.item_start, inclusive=True)
-    wp.launch(
+    launch_over(
         kernels.fill_items,
-        dim=found.shape[0],
+        found.shape[0],
         inputs=[n_found, found],
         outputs=[pairs.item_start, pairs.item],
     )
-    wp.launch(
+    launch_over(
         kernels.count_pairs,
-        dim=n_owner,
+        n_owner,
         inputs=[item_body, pairs.item_start],
         outputs=[pairs.item, pairs.start],
     )
     wp.utils.array_scan(pairs.start, pairs.start, inclusive=False)
-    wp.launch(
+    launch_over(
         kernels.list_pairs,
-        dim=n_owner,
+        n_owner,
         inputs=[item_body, pairs.item_start, pairs.item, pairs.start],
         outputs=[pairs.n, pairs.pair, pairs.items, needed[0:1]],
     )

@@ -6,6 +6,8 @@ import importlib.util
 import inspect
 import json
 import math
+import os
+import time
 from pathlib import Path
 from types import ModuleType
 
@@ -14,14 +16,24 @@ import warp as wp
 
 from warp_contact.errors import UsageError
 from warp_contact.mesh import TetMesh
+from warp_contact.pictures import animate
 from warp_contact.progress import Progress
-from warp_contact.render import animate, render
+from warp_contact.render import render
 from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.simulation import Simulation
-from warp_contact.usd import UsdWriter, frame_numbers, open_stage, read_bodies
+from warp_contact.usd import (
+    UsdWriter,
+    frame_numbers,
+    open_stage,
+    read_bodies,
+    read_points,
+    root_path,
+)
 from warp_contact.usd_check import problems
+from warp_contact.usd_scene import parts
 
 RESPONSES = ("contact-surface", "literal", "penalty", "predicted")
+SAVE_EVERY = 1.0  # least time between two checkpoints of a run, but for the last [s]
 
 
 def run(args) -> int:
@@ -35,19 +47,61 @@ def run(args) -> int:
         )
         view = getattr(module, "VIEW", None)
         view = (view["eye"], view["target"]) if view else None
-        writer = UsdWriter(args.out, sim, flatten=args.flatten, view=view)
+        root = root_path(args.out)
+        saved, metrics = root.with_name("checkpoint.npz"), root.with_name("metrics.jsonl")
+        if args.resume:
+            go_on(sim, root, saved, metrics)
+        else:
+            saved.unlink(missing_ok=True)
+        writer = UsdWriter(root, sim, flatten=args.flatten, view=view, resume=args.resume)
     except ValueError as error:
         raise UsageError(str(error)) from error
-    metrics = writer.root.parent / "metrics.jsonl"
-    with writer, metrics.open("w", encoding="utf-8") as log, Progress(n, args.quiet) as line:
-        record(sim, writer, log)
-        for _ in sim.frames(n):
+    left = max(0, n - sim.frame)
+    with (
+        writer,
+        metrics.open("a" if args.resume else "w", encoding="utf-8") as log,
+        Progress(left, args.quiet) as line,
+    ):
+        if not args.resume:
+            record(sim, writer, log)
+            sim.save(saved)
+        last = time.monotonic()
+        for frame in sim.frames(left):
             measured = record(sim, writer, log)
-            line.update(sim.frame, sim.time, measured.n_contacts, measured.overlap)
+            line.update(frame, sim.time, measured.n_contacts, measured.overlap)
+            if frame == n or time.monotonic() - last >= SAVE_EVERY:
+                sim.save(saved)
+                last = time.monotonic()
     if not args.quiet:
         print(f"{writer.root}: frames {writer.start} to {writer.end}")
         print(metrics)
     return 0
+
+
+def go_on(sim, root: Path, saved: Path, metrics: Path) -> None:
+    """Take an earlier run up at its checkpoint; lines of metrics after it are removed.
+
+    Raises:
+        OSError: a file of the run cannot be read
+        ValueError: there is no checkpoint, or it is of another scene or other settings, or the
+            frames before it are not all there
+    """
+    if not saved.is_file():
+        raise ValueError(f"nothing to resume: no file {saved}")
+    x, begun = sim.positions(), line_of(sim, sim.measure())
+    sim.load(saved)
+    stage = open_stage(root)
+    lines = metrics.read_bytes().splitlines(keepends=True)[: sim.frame + 1]
+    if len(lines) <= sim.frame or sim.frame not in frame_numbers(stage):
+        raise ValueError(f"{root.parent} lacks frames before that of its checkpoint")
+    bodies = dict(zip(sim.model.labels, parts(sim.model), strict=True))
+    points, first = read_points(stage, 0), json.loads(lines[0])
+    same = list(points) == list(bodies)
+    same = same and all(np.array_equal(points[k], x[body.ids]) for k, body in bodies.items())
+    # Of what is measured, these are sums on the host, the same for every device.
+    if not same or any(begun[k] != first[k] for k in ("kinetic", "momentum", "angular_momentum")):
+        raise ValueError(f"{saved} is of a run with other bodies, or placed or moved otherwise")
+    os.truncate(metrics, sum(map(len, lines)))
 
 
 def record(sim, writer: UsdWriter, log):

@@ -3,6 +3,7 @@
 import warp as wp
 
 from warp_contact.kernels import crossing, incidence, penetration, vertex_contact
+from warp_contact.launch import launch_over
 from warp_contact.types import Model
 from warp_contact.work import Work
 
@@ -12,9 +13,9 @@ def hit_depths(model: Model, x: wp.array, work: Work) -> None:
     work.layer.zero_()
     work.pending.zero_()
     hits = [work.candidates.verts.start, work.hit_at, work.hit_vert, work.hit_body]
-    wp.launch(
+    launch_over(
         penetration.border_depth,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[model.n_body, work.surface.id, model.tris]
         + [model.vs_start, model.vs_tri, model.vn_start, model.vn_vert, x, *hits],
         outputs=[work.hit_depth, work.hit_dir, work.hit_layer, work.pending],
@@ -22,9 +23,9 @@ def hit_depths(model: Model, x: wp.array, work: Work) -> None:
 
     def fill_layer() -> None:
         wp.launch(penetration.begin_layer, dim=1, inputs=[], outputs=[work.layer, work.pending])
-        wp.launch(
+        launch_over(
             penetration.propagate,
-            dim=work.capacity.contacts,
+            work.capacity.contacts,
             inputs=[model.n_body, work.layer, model.vn_start, model.vn_vert, x, *hits],
             outputs=[work.hit_depth, work.hit_dir, work.hit_layer, work.pending],
         )
@@ -37,9 +38,9 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
 
     ``fresh``: no overlap is older than the step.
     """
-    wp.launch(
+    launch_over(
         vertex_contact.vertex_contacts,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[model.n_body, fresh, work.surface.id, model.tris, model.body_edge]
         + [model.vert_body, model.on_surface, model.vs_start, model.vs_tri]
         + [model.plane_n, model.plane_h, x0, x]
@@ -50,23 +51,14 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
     _count(work, work.none)
 
 
-def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Append the contact records of the crossings at ``x`` in a step from ``x0``."""
+def edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
+    """Append the contact records of the crossings found in a step from ``x0``."""
     c = work.candidates.edges
-    wp.launch(
+    launch_over(
         crossing.edge_contacts,
-        dim=work.capacity.edges,
-        inputs=[
-            fresh,
-            work.candidates.skin,
-            c.pair,
-            c.items,
-            c.item,
-            work.surface.id,
-            model.tris,
-            model.edges,
-        ]
-        + [model.vert_body, model.body_edge, work.n_hit, work.crossing_at, x0, x],
+        work.capacity.edges,
+        inputs=[c.pair, model.edges, model.vert_body, work.n_hit]
+        + [work.crossing_at, work.crossing, x0],
         outputs=_records(work),
     )
     _count(work, work.n_crossing)
@@ -77,15 +69,15 @@ def contacts_by_vertex(model: Model, work: Work) -> None:
     c = work.contacts
     m = work.capacity.contacts
     c.start.zero_()
-    wp.launch(incidence.count_entries, dim=m, inputs=[c.n, c.vert, c.coef], outputs=[c.start])
+    launch_over(incidence.count_entries, m, inputs=[c.n, c.vert, c.coef], outputs=[c.start])
     wp.utils.array_scan(c.start, c.start, inclusive=True)
-    wp.launch(
+    launch_over(
         incidence.fill_entries,
-        dim=m,
+        m,
         inputs=[c.n, c.vert, c.coef],
         outputs=[c.start, c.entry],
     )
-    wp.launch(incidence.sort_entries, dim=model.n_vert, inputs=[c.start], outputs=[c.entry])
+    launch_over(incidence.sort_entries, model.n_vert, inputs=[c.start], outputs=[c.entry])
 
 
 def _records(work: Work) -> list[wp.array]:

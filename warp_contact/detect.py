@@ -4,6 +4,7 @@ import warp as wp
 
 from warp_contact import candidates
 from warp_contact.kernels import crossing, hits
+from warp_contact.launch import launch_over
 from warp_contact.types import Model
 from warp_contact.work import Work
 
@@ -12,32 +13,34 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
     """Set the hits at ``x``, sorted by vertex and body, and ``hit_at``."""
     candidates.track(model, x, work)
     c = work.candidates.verts
-    wp.launch(
+    work.hit_at.zero_()
+    launch_over(
         hits.find_hits,
-        dim=work.capacity.verts + 1,
+        work.capacity.verts,
         inputs=[c.n, c.pair, c.items, c.item, model.n_body, model.tets]
         + [model.vert_body, model.body_edge, model.plane_n, model.plane_h, work.candidates.way, x],
         outputs=[c.wake, work.hit_at],
     )
     wp.utils.array_scan(work.hit_at, work.hit_at, inclusive=False)
-    wp.launch(
+    launch_over(
         hits.list_hits,
-        dim=work.capacity.verts,
+        work.capacity.verts,
         inputs=[model.n_body, c.pair, work.hit_at],
         outputs=[work.hit_vert, work.hit_body, work.hit_layer],
     )
 
 
 def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Set ``crossing_at``: edges across another body at ``x`` in a step from ``x0``."""
+    """Set ``crossing`` and ``crossing_at``: edges across a body at ``x`` in a step from ``x0``."""
     candidates.track(model, x, work)
     c = work.candidates.edges
-    wp.launch(
+    work.crossing_at.zero_()
+    launch_over(
         crossing.find_crossings,
-        dim=work.capacity.edges + 1,
+        work.capacity.edges,
         inputs=[fresh, work.candidates.skin, c.n, c.pair, c.items, c.item, work.surface.id]
         + [model.tris, model.edges, model.vert_body, model.body_edge]
         + [work.candidates.way, x0, x],
-        outputs=[c.wake, work.crossing_at],
+        outputs=[c.wake, work.crossing_at, work.crossing],
     )
     wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)

@@ -3,6 +3,7 @@
 import warp as wp
 
 from warp_contact.kernels import impulse, pair_impulses, penalty, predicted, warm
+from warp_contact.launch import launch_over
 from warp_contact.response import Penalty
 from warp_contact.types import Model
 from warp_contact.work import Work
@@ -14,9 +15,9 @@ TOLERANCE = 1e-5  # of an edge: an approach in one step that is left to the clos
 def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
     """Set what the sweeps need; contacts from ``first``, shape (1,), on have no impulse yet."""
     c = work.contacts
-    wp.launch(
+    launch_over(
         impulse.begin_contacts,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
         + [model.inv_mass, model.body_edge, work.dt, x0],
         outputs=[c.weight, c.closing, c.open, c.turn, c.lam, c.slip, c.ahead],
@@ -26,9 +27,9 @@ def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
 def recall(model: Model, v: wp.array, work: Work) -> None:
     """Start the contacts of vertices, and ``v``, from the impulses of the last step."""
     c = work.contacts
-    wp.launch(
+    launch_over(
         warm.recall,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[model.friction, work.n_hit, c.n, c.vert, c.coef, c.normal, c.pair, c.weight]
         + [c.open, c.turn, work.partner, work.kept],
         outputs=[c.lam, c.slip, c.ahead, c.part],
@@ -40,9 +41,9 @@ def keep(work: Work) -> None:
     """Keep the impulses of the vertices for the next step."""
     c = work.contacts
     work.partner.fill_(-1)
-    wp.launch(
+    launch_over(
         warm.keep,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[work.n_hit, c.vert, c.pair, c.lam, c.slip],
         outputs=[work.partner, work.kept],
     )
@@ -62,9 +63,9 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
 
     def sweep(last: bool = False) -> None:
         next_sweep(work)
-        wp.launch(
+        launch_over(
             impulse.solve_contacts,
-            dim=work.capacity.contacts,
+            work.capacity.contacts,
             inputs=[model.friction, TOLERANCE, SWEEPS, work.dt, model.body_edge, c.pair, work.done]
             + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.open, c.turn]
             + [v, last],
@@ -86,9 +87,9 @@ def next_sweep(work: Work) -> None:
 def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:
     """Change ``v`` by the penalty forces at the depths found."""
     c = work.contacts
-    wp.launch(
+    launch_over(
         penalty.penalty_impulses,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[response.stiffness, response.damping, model.friction, work.dt]
         + [c.n, c.vert, c.coef, c.normal, c.depth, c.weight, c.open, c.turn, v],
         outputs=[c.lam, c.slip, c.part],
@@ -99,9 +100,9 @@ def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:
 def push_apart(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
     """Change ``v`` by the forces that close the gaps at the predicted positions ``x``."""
     c = work.contacts
-    wp.launch(
+    launch_over(
         predicted.predicted_impulses,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[model.n_body, model.friction, work.dt]
         + [c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.weight, c.open, c.turn, x, v],
         outputs=[c.lam, c.slip, c.part],
@@ -126,9 +127,9 @@ def record_edges(work: Work, unit: float) -> None:
 
 def _record(work: Work, unit: float, first: wp.array, end: wp.array) -> None:
     c = work.contacts
-    wp.launch(
+    launch_over(
         pair_impulses.add_pair_impulses,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[unit, first, end, c.pair, c.normal, c.lam, c.slip],
         outputs=[work.pair_key, work.pair_total, c.needed[1:2]],
     )
@@ -136,9 +137,9 @@ def _record(work: Work, unit: float, first: wp.array, end: wp.array) -> None:
 
 def _apply(model: Model, v: wp.array, work: Work) -> None:
     c = work.contacts
-    wp.launch(
+    launch_over(
         impulse.apply_impulses,
-        dim=model.n_vert,
+        model.n_vert,
         inputs=[c.start, c.entry, c.part, model.inv_mass],
         outputs=[v, work.impulse],
     )

@@ -79,8 +79,29 @@ class Meter:
         self.names = [*model.labels, *(f"plane{p}" for p in range(model.n_plane))]
         self._tets = model.tets.numpy()
         self._volume = model.volume.numpy()
-        self._bvhs = None
+        self._bvhs = self._last = None
         self._tunnelled, self._tunnelled_pair = 0, None
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """What it remembers of the states measured so far."""
+        if self._last is None:
+            return {}
+        kept = {"last": self._last, "entered": self._entered, "deep": self._deep}
+        memory = {name: array.numpy() for name, array in kept.items()}
+        return memory | {
+            "tunnelled": np.array(self._tunnelled),
+            "tunnelled_pair": np.array(self._tunnelled_pair or (), dtype=str),
+        }
+
+    def remember(self, memory: dict[str, np.ndarray]) -> None:
+        """Go on from the ``memory`` of another meter of the same model."""
+        if not memory:
+            return
+        self._begin(wp.array(memory["last"], dtype=wp.vec3))
+        self._entered.assign(memory["entered"])
+        self._deep.assign(memory["deep"])
+        self._tunnelled = int(memory["tunnelled"])
+        self._tunnelled_pair = tuple(memory["tunnelled_pair"].tolist()) or None
 
     def measure(self, state: State, work: Work, unit: float, duration: float, dt: float) -> Measure:
         """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s]."""
@@ -175,16 +196,20 @@ class Meter:
         own = work.contacts.vert.numpy()[:n, :2]  # the others are those of the other side
         return own[work.contacts.coef.numpy()[:n, :2] != 0.0]
 
+    def _begin(self, x: wp.array) -> None:
+        """Remember the first state."""
+        surf = np.repeat(self.model.surf.numpy()[:, None], 2, axis=1)
+        ends = np.concatenate([surf, self.model.edges.numpy()[:, :2]])
+        self._ends = wp.array(ends, dtype=wp.vec2i)
+        self._entered = wp.full(len(ends), -1, dtype=int)
+        self._deep = wp.zeros(len(ends), dtype=int)
+        self._last = x
+
     def _follow(self, x: wp.array) -> None:
         """Count the points that went through something since the last call."""
         model = self.model
-        if self._bvhs is None:
-            surf = np.repeat(model.surf.numpy()[:, None], 2, axis=1)
-            ends = np.concatenate([surf, model.edges.numpy()[:, :2]])
-            self._ends = wp.array(ends, dtype=wp.vec2i)
-            self._entered = wp.full(len(ends), -1, dtype=int)
-            self._deep = wp.zeros(len(ends), dtype=int)
-            self._last = wp.clone(x)
+        if self._last is None:
+            self._begin(wp.clone(x))
             return
         bodies, surface, _ = self._refit(self._last, x)
         passed = wp.zeros(len(self._ends), dtype=int)

@@ -225,6 +225,7 @@ class Simulation:
             values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
             values |= {"frame": np.array(self.frame), "substeps": np.array(self.substeps)}
             values |= {f"start.{k}": start for k, start in self._spectrum.starts().items()}
+            values |= {f"meter.{k}": value for k, value in self._meter.memory().items()}
         if self._search is not None:
             values |= {"search": np.array(self._search)}
         if self._dt is not None:
@@ -245,8 +246,9 @@ class Simulation:
             starts = {k[6:]: start for k, start in values.items() if k.startswith("start.")}
             self._spectrum.start_from(starts)
             self._work = allocate_work(self.model, self.state, self._work.capacity)
+            self._meter = Meter(self.model)
+            self._meter.remember({k[6:]: v for k, v in values.items() if k.startswith("meter.")})
         self._graphs.clear()
-        self._meter = Meter(self.model)
         self.frame, self.substeps = int(values["frame"]), int(values["substeps"])
         self._search = bool(values["search"]) if "search" in values else None
         self._dt = float(values["dt"]) if "dt" in values else None

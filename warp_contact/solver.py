@@ -101,7 +101,7 @@ def steps(model: Model, state: State, work: Work, *others) -> None:
 
     def one() -> None:
         step(model, state, work, *others)
-        wp.launch(motion.count_down, dim=1, inputs=[], outputs=[work.steps])
+        wp.launch(motion.count_down, dim=1, inputs=[work.contacts.needed], outputs=[work.steps])
 
     wp.capture_while(work.steps, one)
 
@@ -169,7 +169,7 @@ def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bo
     wp.capture_if(work.candidates.edges.n, look)
 
     def append() -> None:
-        depth.edge_contacts(model, x0, x, work, fresh)
+        depth.edge_contacts(model, x0, work)
         depth.contacts_by_vertex(model, work)
         impulse.begin(model, x0, work, work.n_hit)
 

@@ -7,6 +7,7 @@ import warp as wp
 from warp_contact.forces import internal_forces
 from warp_contact.impulse import next_sweep
 from warp_contact.kernels import closure, incidence, region, surface
+from warp_contact.launch import launch_over
 from warp_contact.response import ContactSurface
 from warp_contact.types import Contacts, Model
 from warp_contact.work import Work
@@ -21,9 +22,9 @@ def leftover(model: Model, x: wp.array, work: Work) -> None:
     """Set ``contacts.left`` at ``x``, and ``found``: what stage 4 has to do."""
     c = work.contacts
     work.found.zero_()
-    wp.launch(
+    launch_over(
         closure.leftover,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[TOLERANCE, DEEP, c.n, c.vert, c.coef, c.normal, c.offset, c.pair]
         + [model.body_edge, c.closing, work.dt, x],
         outputs=[c.left, work.found, work.deep_found],
@@ -114,9 +115,9 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work, search: bool) -> N
     step are left to it.
     """
     c = work.contacts
-    wp.launch(
+    launch_over(
         closure.begin_closure,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[BOUND, DEEP if search else math.inf, c.n, c.pair, model.body_edge]
         + [c.closing, work.dt, c.left],
         outputs=[c.slack, c.push],
@@ -124,9 +125,9 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work, search: bool) -> N
 
     def sweep() -> None:
         next_sweep(work)
-        wp.launch(
+        launch_over(
             closure.solve_gaps,
-            dim=work.capacity.contacts,
+            work.capacity.contacts,
             inputs=[TOLERANCE, model.n_body, PASSES, c.n, c.vert, c.coef, c.normal, c.offset]
             + [c.pair, c.weight, model.body_edge, c.slack, x, work.done],
             outputs=[c.push, c.part, work.again],
@@ -136,9 +137,9 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work, search: bool) -> N
     work.done.zero_()
     wp.copy(work.again, c.n)
     wp.capture_while(work.again, sweep)
-    wp.launch(
+    launch_over(
         closure.couples,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[c.n, c.vert, c.coef, c.normal, c.turn, c.push, v],
         outputs=[c.part],
     )
@@ -146,9 +147,9 @@ def close(model: Model, x: wp.array, v: wp.array, work: Work, search: bool) -> N
 
 
 def _add_parts(model: Model, c: Contacts, y: wp.array) -> None:
-    wp.launch(
+    launch_over(
         incidence.add_parts,
-        dim=model.n_vert,
+        model.n_vert,
         inputs=[c.start, c.entry, c.part, model.inv_mass],
         outputs=[y],
     )
@@ -175,9 +176,9 @@ def _tractions(model: Model, x: wp.array, work: Work, out: wp.array) -> None:
 
 def _side_means(work: Work, traction: wp.array) -> None:
     c = work.contacts
-    wp.launch(
+    launch_over(
         surface.side_means,
-        dim=work.capacity.contacts,
+        work.capacity.contacts,
         inputs=[c.n, c.vert, c.coef, work.s, traction, work.stiffness, work.fraction],
         outputs=[work.upper_mean, work.lower_mean],
     )

@@ -49,8 +49,9 @@ class UsdWriter:
         animate_tets: bool = False,
         view: tuple | None = None,
         pressure_scale: float | None = None,
+        resume: bool = False,
     ):
-        """Start a file; an earlier one at the same place is removed.
+        """Start a file; an earlier one at the same place is removed, or resumed.
 
         Args:
             path: a directory, whose name the root layer takes, or the ``.usda`` root layer itself
@@ -62,6 +63,13 @@ class UsdWriter:
             view: eye and target [m] of a camera to write
             pressure_scale: pressure [Pa] drawn as fully hot; None takes twice the hydrostatic
                 pressure over the scene's size, or without gravity the highest pressure so far
+            resume: go on after frame ``sim.frame`` of the earlier file, which was written with the
+                same arguments; the frames after it are removed
+
+        Raises:
+            OSError: a file cannot be written, or there is none to resume
+            ValueError: the path is that of another file, or what is there to resume has no such
+                frame or other bodies
         """
         self.root = root_path(path)
         self.sim, self.velocities, self.flatten = sim, velocities, flatten
@@ -72,14 +80,14 @@ class UsdWriter:
         self.base = np.repeat([part.color for part in self.parts], counts, axis=0)
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
         self.grows = self.scale == 0.0
-        frames = self.root.parent / "frames"
-        frames.mkdir(parents=True, exist_ok=True)
-        self.root.unlink(missing_ok=True)
-        stale = [*frames.glob("f.*.usdc"), *frames.glob(".tmp.*"), self.root.with_suffix(".usdc")]
-        for old in stale:
-            old.unlink(missing_ok=True)
-        export(topology(self.parts, sim, tets, view), self.root.parent / "topology.usdc")
         self.layer = self._declare()
+        if resume:
+            self._reopen()
+            self._remove(after=self.end)
+            return
+        self.root.unlink(missing_ok=True)
+        self._remove()
+        export(topology(self.parts, sim, tets, view), self.root.parent / "topology.usdc")
         export(self.layer, self.root.parent / "manifest.usdc")
         self._write_root()
 
@@ -101,7 +109,8 @@ class UsdWriter:
             if self.end is not None:
                 self.layer.EraseTimeSample(path, self.end)
             self.layer.SetTimeSample(path, frame, value)
-        export(self.layer, self.root.parent / "frames" / f"f.{frame:06d}.usdc")
+        self.layer.customLayerData = {"pressureScale": self.scale}
+        export(self.layer, self._frame(frame))
         self.start = frame if self.start is None else self.start
         self.end = frame
         self._write_root()
@@ -110,6 +119,31 @@ class UsdWriter:
         """Flatten, if asked to."""
         if self.flatten and self.end is not None:
             export(open_stage(self.root).Flatten(), self.root.with_suffix(".usdc"))
+
+    def _frame(self, frame: int) -> Path:
+        """The file of a frame."""
+        return self.root.parent / "frames" / f"f.{frame:06d}.usdc"
+
+    def _reopen(self) -> None:
+        """Make the earlier file end at the frame of the simulation."""
+        stage, frame = open_stage(self.root), self.sim.frame
+        if [body.label for body in read_bodies(stage)] != list(self.sim.model.labels):
+            raise ValueError(f"{self.root} has other bodies")
+        if frame not in frame_numbers(stage) or not self._frame(frame).is_file():
+            raise ValueError(f"{self.root} has no frame {frame} to go on from")
+        last = Sdf.Layer.OpenAsAnonymous(str(self._frame(frame)))
+        self.scale = last.customLayerData.get("pressureScale", self.scale)
+        self.start, self.end = frame_numbers(stage)[0], frame
+        self._write_root()
+
+    def _remove(self, after: int = -1) -> None:
+        """Remove the frames after one, and what is unfinished or flattened."""
+        frames = self._frame(0).parent
+        frames.mkdir(parents=True, exist_ok=True)
+        kept = {self._frame(frame) for frame in range(after + 1)}
+        for old in {*frames.glob("f.*.usdc"), *frames.glob(".tmp.*")} - kept:
+            old.unlink(missing_ok=True)
+        self.root.with_suffix(".usdc").unlink(missing_ok=True)
 
     def _values(self):
         """The attributes of this frame: path and value."""

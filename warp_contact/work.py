@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from warp_contact.kernels import bounds
+from warp_contact.kernels.edge_contact import EdgeContact
 from warp_contact.kernels.near import MANY, Near
 from warp_contact.types import Candidates, Capacity, Contacts, Model, Pairs, State
 
@@ -33,6 +34,7 @@ class Work:
         candidates: what may touch
         hit_at: hits before each candidate vertex, shape (capacity.verts + 1,)
         hit_vert, hit_body, hit_layer, hit_depth, hit_dir: the hits, shape (capacity.contacts,)
+        crossing: the contacts of candidate edges, shape (capacity.edges,)
         crossing_at: contacts before each candidate edge, shape (capacity.edges + 1,)
         layer: layer of the propagation, shape (1,)
         pending: whether it goes on, shape (1,)
@@ -81,6 +83,7 @@ class Work:
     hit_layer: wp.array
     hit_depth: wp.array
     hit_dir: wp.array
+    crossing: wp.array
     crossing_at: wp.array
     layer: wp.array
     pending: wp.array
@@ -145,6 +148,7 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
         hit_layer=_ints(m),
         hit_depth=_floats(m),
         hit_dir=_vectors(m),
+        crossing=wp.zeros(capacity.edges, dtype=EdgeContact),
         crossing_at=crossing_at,
         layer=_ints(1),
         pending=_ints(1),

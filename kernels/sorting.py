@@ -1,0 +1,23 @@
+"""A part of a list in ascending order, by one thread: the parts are short."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def sort(values: wp.array[int], first: int, end: int):
+    """Sort the values from ``first`` to ``end``, in place (Shell 1959).
+
+    What is in order already costs one comparison each.
+    """
+    gap = (end - first) // 2
+    while gap > 0:
+        for e in range(first + gap, end):
+            value = values[e]
+            k = int(e)
+            while k >= first + gap and values[wp.max(k - gap, 0)] > value:
+                values[k] = values[wp.max(k - gap, 0)]
+                k -= gap
+            values[k] = value
+        gap = gap * 5 // 11

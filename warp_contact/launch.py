@@ -1,0 +1,14 @@
+"""Launches over lists of which a part is in use, or has much to do.
+
+A thread of Warp's CPU device costs 20 to 50 ns before it does anything: it loads all arguments of
+its kernel. Kernels over lists therefore take the number of their threads and let each have every
+so-manieth entry: on the CPU one thread has them all, on a GPU each has its own.
+"""
+
+import warp as wp
+
+
+def launch_over(kernel: wp.Kernel, n: int, inputs: list, outputs: list) -> None:
+    """Launch ``kernel``, whose first argument is the number of threads, over ``n`` entries."""
+    threads = 1 if wp.get_device().is_cpu else n
+    wp.launch(kernel, dim=threads, inputs=[threads, *inputs], outputs=outputs)

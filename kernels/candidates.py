@@ -33,6 +33,7 @@ SHORTEST = wp.constant(8.0)  # span
 LONGEST = wp.constant(64.0)  # span
 UNIT = wp.constant(1.0e4)  # counts of an edge, for a sum that does not depend on its order
 CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves
+FADING = wp.constant(0.8)  # of a motion from look to look
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the maximum
 
 
@@ -152,11 +153,13 @@ def choose_skins(
 def go_on(
     # in, out
     motion: wp.array[float],  # (n_body,) [m] 0 on return
+    pace: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
     way: wp.array[float],  # (n_body + n_plane,) [m]
 ):
     """One thread per body."""
     m = wp.tid()
     way[m] = way[m] + motion[m]
+    pace[m] = wp.max(motion[m], FADING * pace[m])
     motion[m] = 0.0
 
 

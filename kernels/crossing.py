@@ -12,6 +12,8 @@ from warp_contact.kernels.vertex_contact import SLIP
 
 wp.set_module_options({"enable_backward": False})
 
+AHEAD = wp.constant(16.0)  # looks: a distance that lasts so long need not be known any better
+
 
 @wp.func
 def clearance(
@@ -48,6 +50,7 @@ def find_crossings(
     edges: wp.array[wp.vec4i],  # (n_edge,)
     vert_body: wp.array[int],  # (n_vert,)
     body_edge: wp.array[float],  # (n_body,) [m]
+    pace: wp.array[float],  # (n_body,) [m]
     way: wp.array[float],  # (n_body,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -67,7 +70,8 @@ def find_crossings(
         reach = skin[vert_body[i]] + skin[body]
         if spent < wake[c]:
             continue
-        clear = clearance(pair_tris[c], reach, tri, tris, x, x[i], x[j])
+        enough = wp.min(AHEAD * (pace[vert_body[i]] + pace[body]), reach)
+        clear = clearance(pair_tris[c], enough, tri, tris, x, x[i], x[j])
         wake[c] = spent + CAREFUL * clear
         if clear > 0.0:
             continue

@@ -200,6 +200,7 @@ def visit_planes(
     # in
     n_tet: int,
     skin: wp.array[float],  # (n_body,) [m]
+    awake: wp.array[int],  # (n_body,)
     surf: wp.array[int],  # (n_surf,)
     vert_body: wp.array[int],  # (n_vert,)
     plane_n: wp.array[wp.vec3],  # (n_plane,)
@@ -212,6 +213,8 @@ def visit_planes(
 ):
     """One thread per surface vertex: the planes that it may come to pass."""
     i = surf[wp.tid()]
+    if awake[vert_body[i]] == 0:
+        return
     for p in range(plane_n.shape[0]):
         if wp.dot(plane_n[p], x[i]) < plane_h[p] + skin[vert_body[i]]:
             append(i, n_tet + p, found, n_found)

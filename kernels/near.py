@@ -50,6 +50,7 @@ def near_bodies(
     bodies: wp.uint64,  # Bvh over the boxes, grouped by world
     world: wp.array[int],  # (n_body,)
     body_vert: wp.array[int],  # (n_body + 1,)
+    awake: wp.array[int],  # (n_body,)
     lower: wp.array[wp.vec3],  # (n_body,) [m]
     upper: wp.array[wp.vec3],  # (n_body,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -59,7 +60,7 @@ def near_bodies(
     slab: wp.array2d[wp.vec4],  # (n_body, MANY) axis towards the near body, where it begins [m]
     end: wp.array2d[float],  # (n_body, MANY) where the own body ends along the axis [m]
 ):
-    """One thread per body: list the bodies of its world that may touch it."""
+    """One thread per body: list the bodies of its world that may touch it, if one is awake."""
     m = wp.tid()
     n_near[m] = 0
     # What has exploded has no contacts, and no loop over its cells.
@@ -69,7 +70,7 @@ def near_bodies(
     other = int(0)
     query = wp.bvh_query_aabb(bodies, lower[m], upper[m], wp.bvh_get_group_root(bodies, world[m]))
     while wp.bvh_query_next(query, other):
-        if count <= MANY and other != m:
+        if count <= MANY and other != m and awake[m] + awake[other] > 0:
             if boxes_meet(lower[m], upper[m], lower[other], upper[other]):
                 axis = wp.normalize((lower[other] + upper[other]) - (lower[m] + upper[m]))
                 begin = -support(other, -axis, skin[other], body_vert, lower, upper, x)

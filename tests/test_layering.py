@@ -15,7 +15,8 @@ LADDER = (  # a module imports from lower rungs only
     {"topology", "errors", "progress", "response", "types", "usd_scene", "materials"}
     | {"pictures", "launch"},
     {"mesh", "work", "forces", "usd", "checkpoint", "raycast"},
-    {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"},
+    {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"}
+    | {"rest"},
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},
     {"solver"},
     {"simulation"},

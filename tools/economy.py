@@ -19,14 +19,18 @@ are apart; what contact adds is step - elastic. ``slope over pairs`` is the expo
 adds beyond the row apart, ~ pairs^p: 1 where each pair costs the same and none costs nothing.
 ``ms for any pair`` and ``ms per pair`` are the straight line through it; ``mesh / plane`` is the
 ratio of what contact adds on both floors.
+
+Last, frames of 32 blocks in 16 columns [ms]: while they settle, at rest, and asleep, with how far
+sleep let them come from where they else are.
 """
 
 import argparse
 import sys
+from time import perf_counter
 
 import numpy as np
 import warp as wp
-from benching.crowd import rows
+from benching.crowd import blocks, rows
 from benching.figures import log_slope, step_figures
 from benching.machine import write
 from benching.options import count
@@ -37,6 +41,7 @@ from warp_contact import Simulation
 
 FRICTIONS = 0.3, 0.0
 SUBSTEPS = 20
+SETTLING, REST, LONG, SAMPLE = 20, 40, 900, 20  # frames of the blocks
 SHORT = "damp", "predict", "cand", "verts", "edges", "impulse", "close"  # as in STAGES
 COLUMNS = "vertices", "contacts", "launches", "step", "elastic", *SHORT, "KiB"
 
@@ -70,10 +75,45 @@ def main() -> int:
         for name, value in summary(timings, pairs).items():
             found[f"{name}.{friction:g}"] = value
             said.append(f"friction {friction:g}: {name} {value:.3g}")
+    for name, value in sleep_figures(args.device).items():
+        found[f"blocks.{name}"] = value
+        said.append(f"blocks: {name} {value:.3g}")
     print("", *said, sep="\n")
     if args.out:
         write(args.out, wp.get_device(args.device), found)
     return 0
+
+
+def sleep_figures(device: str | None) -> dict[str, float]:
+    """What a frame of blocks costs settling, at rest and asleep, and what sleep changes."""
+    sims = [Simulation(blocks(), sleeping=sleeping, device=device) for sleeping in (False, True)]
+    awake, asleep = sims
+    settling = frame_ms(awake, SETTLING)
+    while asleep.frame < REST or (asleep.state.v.numpy().any() and asleep.frame < LONG):
+        asleep.step_frame()
+    while awake.frame < asleep.frame:
+        awake.step_frame()
+    resting, sleeping = frame_ms(awake, SAMPLE), frame_ms(asleep, SAMPLE)
+    apart = np.abs(awake.positions() - asleep.positions()).max() / awake.model.body_edge.numpy()[0]
+    return {
+        "settling ms": settling,
+        "at rest ms": resting,
+        "asleep ms": sleeping,
+        "asleep / settling": sleeping / settling,
+        "frames until all sleep": float(asleep.frame - SAMPLE),
+        "sleep moved, of an edge": float(apart),
+    }
+
+
+def frame_ms(sim: Simulation, frames: int) -> float:
+    """Median time of the next frames [ms]."""
+    times = []
+    for _ in range(frames):
+        start = perf_counter()
+        sim.step_frame()
+        wp.synchronize_device(sim.device)
+        times.append(1e3 * (perf_counter() - start))
+    return float(np.median(times))
 
 
 def line(name: str, friction: float, vertices: int, timing: Timing) -> str:

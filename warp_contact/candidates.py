@@ -38,7 +38,7 @@ def track(model: Model, x: wp.array, work: Work) -> None:
     """Let the bodies go on to ``x``, where candidates are looked at."""
     c = work.candidates
     _move(model, x, work)
-    wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=[c.motion, c.way])
+    wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=[c.motion, c.pace, c.way])
 
 
 def _move(model: Model, x: wp.array, work: Work) -> None:
@@ -83,6 +83,7 @@ def _find_near(model: Model, work: Work) -> None:
         near.near_bodies,
         dim=model.n_body,
         inputs=[model.cell, c.skin, work.bodies.id, model.body_world, model.body_vert]
+        + [work.awake.bodies]
         + [work.lower, work.upper, c.x],
         outputs=[of.n_near, of.near, of.slab, of.end],
     )
@@ -142,6 +143,7 @@ def _find_tets(model: Model, work: Work) -> None:
             inputs=[
                 model.n_tet,
                 c.skin,
+                work.awake.bodies,
                 model.surf,
                 model.vert_body,
                 model.plane_n,

@@ -52,3 +52,8 @@ def read(path: str | os.PathLike, scene: str) -> dict[str, np.ndarray]:
     if str(values.pop("scene", "")) != scene:
         raise ValueError(f"{path} is of another scene, or of other settings of the simulation")
     return values
+
+
+def part(values: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+    """The values called ``name.something``, by something."""
+    return {k.removeprefix(f"{name}."): v for k, v in values.items() if k.startswith(f"{name}.")}

@@ -43,7 +43,12 @@ def run(args) -> int:
     n = args.frames or getattr(module, "FRAMES", 120)
     try:
         sim = Simulation(
-            scene, response(module, args), fps=args.fps, substeps=args.substeps, device=args.device
+            scene,
+            response(module, args),
+            fps=args.fps,
+            substeps=args.substeps,
+            device=args.device,
+            sleeping=not args.no_sleep,
         )
         view = getattr(module, "VIEW", None)
         view = (view["eye"], view["target"]) if view else None

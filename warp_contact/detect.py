@@ -40,7 +40,7 @@ def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: b
         work.capacity.edges,
         inputs=[fresh, work.candidates.skin, c.n, c.pair, c.items, c.item, work.surface.id]
         + [model.tris, model.edges, model.vert_body, model.body_edge]
-        + [work.candidates.way, x0, x],
+        + [work.candidates.pace, work.candidates.way, x0, x],
         outputs=[c.wake, work.crossing_at, work.crossing],
     )
     wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)

@@ -58,7 +58,7 @@ def forget(work: Work) -> None:
 
 
 def exchange(model: Model, v: wp.array, work: Work) -> None:
-    """Change ``v`` by normal impulses and friction until no contact approaches."""
+    """Change ``v`` by normal impulses and friction until no contact approaches; set ``found``."""
     c = work.contacts
 
     def sweep(last: bool = False) -> None:
@@ -77,6 +77,7 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
     wp.copy(work.again, c.n)
     wp.capture_while(work.again, sweep)
     sweep(last=True)
+    work.found.fill_(1)
 
 
 def next_sweep(work: Work) -> None:

@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import numpy as np
 import warp as wp
@@ -15,6 +15,7 @@ from warp_contact.forces import stages_for
 from warp_contact.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.rest import Rest, keep_forces
 from warp_contact.scene import Body, Scene
 from warp_contact.spectrum import Spectrum
 from warp_contact.substeps import (
@@ -54,6 +55,7 @@ class Simulation:
         fps: float = 60,
         substeps: int | None = None,
         device: str | None = None,
+        sleeping: bool = True,
     ):
         """Lay out a scene.
 
@@ -64,6 +66,8 @@ class Simulation:
             substeps: steps in each frame; None takes the stable step of the assembled system,
                 shorter where bodies approach each other fast
             device: ``cpu``, ``cuda:0``, ...; None takes Warp's default
+            sleeping: under gravity, bodies at rest are left alone until something comes near, see
+                ``rest``
 
         Raises:
             ValueError: for an empty scene, an unknown device, fps or substeps that are not positive
@@ -83,7 +87,10 @@ class Simulation:
             self.model, self.state = assemble(scene)
             self._spectrum = Spectrum(self.model)
             self._meter = Meter(self.model)
-            self._work: Work = allocate_work(self.model, self.state, Capacity())
+            # Without weight, what hardly moves need not be held by anything: it flies.
+            sleeping = sleeping and any(self.model.gravity)
+            self._rest = Rest(self.model, self.state, fps) if sleeping else None
+            self._work: Work = self._allocate(self.state, Capacity())
             self._saved = State(wp.clone(self.state.x), wp.clone(self.state.v))
         inv_mass = self.model.inv_mass.numpy()
         mobile = float(self.model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
@@ -125,6 +132,10 @@ class Simulation:
         that came, is repeated from its start: nothing is lost.
         """
         with wp.ScopedDevice(self.device):
+            if self._rest and not self._rest.update(self.state, self._work):
+                self._rest.begin_frame(self.state, self._work)
+                self.frame += 1
+                return
             wp.copy(self._saved.x, self.state.x)
             wp.copy(self._saved.v, self.state.v)
             while self._search is None or self._grow():
@@ -183,6 +194,8 @@ class Simulation:
             raise ValueError(f"velocity of body '{self._label(body)}' is not finite")
         v[where] = part
         self.state.v.assign(v)
+        if self._rest:
+            self._rest.wake(body.index if isinstance(body, Body) else int(body))
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""
@@ -226,6 +239,9 @@ class Simulation:
             values |= {"frame": np.array(self.frame), "substeps": np.array(self.substeps)}
             values |= {f"start.{k}": start for k, start in self._spectrum.starts().items()}
             values |= {f"meter.{k}": value for k, value in self._meter.memory().items()}
+            if self._rest:
+                rest = self._rest.values(self._work)
+                values |= {f"rest.{k}": value for k, value in rest.items()}
         if self._search is not None:
             values |= {"search": np.array(self._search)}
         if self._dt is not None:
@@ -243,11 +259,16 @@ class Simulation:
         with wp.ScopedDevice(self.device):
             self.state.x.assign(values["x"])
             self.state.v.assign(values["v"])
-            starts = {k[6:]: start for k, start in values.items() if k.startswith("start.")}
-            self._spectrum.start_from(starts)
-            self._work = allocate_work(self.model, self.state, self._work.capacity)
+            self._spectrum.start_from(checkpoint.part(values, "start"))
             self._meter = Meter(self.model)
-            self._meter.remember({k[6:]: v for k, v in values.items() if k.startswith("meter.")})
+            self._meter.remember(checkpoint.part(values, "meter"))
+            rest = checkpoint.part(values, "rest")
+            room = len(rest.get("pair_key", ()))
+            capacity = self._work.capacity
+            capacity = replace(capacity, pairs=max(capacity.pairs, room))
+            self._work = self._allocate(self.state, capacity)
+            if self._rest:
+                self._rest.go_on(rest, self.state, self._work)
         self._graphs.clear()
         self.frame, self.substeps = int(values["frame"]), int(values["substeps"])
         self._search = bool(values["search"]) if "search" in values else None
@@ -255,11 +276,18 @@ class Simulation:
         self._rates = tuple(map(float, values["rates"])) if "rates" in values else None
 
     def _fingerprint(self) -> str:
-        return checkpoint.fingerprint(self.model, self.response, self.fps, self._wanted)
+        sleeping = self._rest is not None
+        return checkpoint.fingerprint(self.model, self.response, self.fps, self._wanted, sleeping)
 
     def _run(self, omega: float, rate: float, last: int) -> float:
         """Step one frame at the rates [1/s] given, after ``last`` steps; return the step [s]."""
         work = self._work
+        if self._rest:
+            self._rest.begin_frame(self.state, work)
+        else:
+            work.impulse.zero_()
+            work.pair_key.fill_(-1)
+            work.pair_total.zero_()
         n = self._wanted or steps_in_frame(self._steps_per_second(omega), self.fps, last)
         dt = 1.0 / (self.fps * n)
         stages = stages_for(rate, dt)
@@ -268,9 +296,6 @@ class Simulation:
             solver.kick(self.model, self.state, work)  # velocities lag by half a step
         work.dt.fill_(dt)
         work.partner.fill_(-1)  # a frame depends on nothing but the state before it
-        work.impulse.zero_()
-        work.pair_key.fill_(-1)
-        work.pair_total.zero_()
         work.contacts.needed.zero_()
         work.deep_found.zero_()
         work.bodies.rebuild()
@@ -300,6 +325,10 @@ class Simulation:
             self._graphs[key] = capture.graph
         return self._graphs[key]
 
+    def _allocate(self, state: State, capacity: Capacity) -> Work:
+        awake = self._rest.awake if self._rest else None
+        return allocate_work(self.model, state, capacity, awake)
+
     def _grow(self) -> bool:
         """Enlarge the buffers that the frame outgrew; True if there were any."""
         needed = self._work.contacts.needed.numpy()
@@ -307,7 +336,9 @@ class Simulation:
             return False
         old = astuple(self._work.capacity)
         capacity = [max(have, 2 * int(n)) for have, n in zip(old, needed, strict=True)]
-        self._work = allocate_work(self.model, self._saved, Capacity(*capacity))
+        before, self._work = self._work, self._allocate(self._saved, Capacity(*capacity))
+        if self._rest:
+            keep_forces(before, self._work)
         self._graphs.clear()
         return True
 

@@ -40,6 +40,9 @@ def step(
         exchange()
         impulse.record_edges(work, unit)
 
+    def look_again() -> None:
+        edge_contacts(model, state.x, state.x, work, not search)
+
     def exchange_twice() -> None:
         exchange_edges()
         # The impulses may have led other edges across each other. Were these left to the closure,
@@ -58,7 +61,7 @@ def step(
         impulse.keep(work)
         impulse.record_vertices(work, unit)
         drift(model, state, work, state.x)
-        edge_contacts(model, state.x, state.x, work, not search)
+        wp.capture_if(work.found[0:1], look_again)  # impulses moved what was looked at
         move_surfaces(model, state, work, response, search)  # what the step did not create
 
     def fly() -> None:
@@ -121,11 +124,11 @@ def overlaps(model: Model, state: State, work: Work) -> bool:
 
 def kick(model: Model, state: State, work: Work) -> None:
     """Add the acceleration by internal forces and gravity over ``work.dt`` to ``state.v``."""
-    internal_forces(model, state.x, work.ones, work.f_tet)
+    internal_forces(model, state.x, work.awake.tets, work.f_tet)
     wp.launch(
         motion.predict,
         dim=model.n_vert,
-        inputs=[model.vt_start, model.vt_corner, work.f_tet, model.inv_mass]
+        inputs=[model.vt_start, model.vt_corner, work.f_tet, work.awake.inv_mass]
         + [wp.vec3(*model.gravity), work.dt, state.x, state.v],
         outputs=[work.x, state.v],
     )
@@ -138,7 +141,9 @@ def predict(model: Model, state: State, work: Work, stages: int) -> None:
     to their neighbours before the impulses see them, and rest would depend on the damping.
     """
     if stages > 0:
-        damp(model, state.x, state.v, work.dt, work.f_tet, (work.v, work.s), stages)
+        scratch = work.v, work.s
+        inv_mass = work.awake.inv_mass
+        damp(model, state.x, state.v, work.dt, work.f_tet, scratch, stages, inv_mass)
     kick(model, state, work)
 
 
@@ -165,6 +170,7 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
 def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
     work.n_crossing.zero_()
+    work.found.zero_()
     look = partial(detect.find_crossings, model, x0, x, work, fresh)
     wp.capture_if(work.candidates.edges.n, look)
 

@@ -150,6 +150,21 @@ class Pairs:
 
 
 @dataclass
+class Awake:
+    """What moves: all, unless bodies at rest may sleep.
+
+    Attributes:
+        bodies: 1, asleep 0, shape (n_body,)
+        tets: the same of the tets, shape (n_tet,)
+        inv_mass: 1 / m, 0 for a fixed vertex and asleep [1/kg], shape (n_vert,)
+    """
+
+    bodies: wp.array
+    tets: wp.array
+    inv_mass: wp.array
+
+
+@dataclass
 class Candidates:
     """What may touch as long as no vertex is further than the skin from where it was then.
 
@@ -157,7 +172,8 @@ class Candidates:
         x: positions of the candidates [m], shape (n_vert,)
         skin: how far from them they hold [m], shape (n_body,)
         motion: largest motion of each body since the last look [m], shape (n_body,)
-        fastest: largest of these when they were found [m], shape (1,)
+        pace: what motion to expect in the next looks [m], shape (n_body,)
+        fastest: largest of the motions when they were found [m], shape (1,)
         total: their sum, in counts of kernels/candidates.py, shape (1,)
         stale: whether they have to be found again, shape (1,)
         edge: shortest mean edge of a body [m]
@@ -174,6 +190,7 @@ class Candidates:
     x: wp.array
     skin: wp.array
     motion: wp.array
+    pace: wp.array
     fastest: wp.array
     total: wp.array
     stale: wp.array

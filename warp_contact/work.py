@@ -7,7 +7,7 @@ import warp as wp
 from warp_contact.kernels import bounds
 from warp_contact.kernels.edge_contact import EdgeContact
 from warp_contact.kernels.near import MANY, Near
-from warp_contact.types import Candidates, Capacity, Contacts, Model, Pairs, State
+from warp_contact.types import Awake, Candidates, Capacity, Contacts, Model, Pairs, State
 
 
 @dataclass
@@ -18,7 +18,7 @@ class Work:
         capacity: what there is room for
         dt: the step [s], shape (1,)
         steps: how many the frame still has, shape (1,)
-        ones: a mask that lets every tet pass, shape (n_tet,)
+        awake: what moves
         mask: tets that touch the deformation region, shape (n_tet,)
         f_tet: forces on the corners of each tet [N], shape (n_tet, 4)
         x: predicted positions, then those before stage 4 [m], shape (n_vert,)
@@ -43,7 +43,8 @@ class Work:
         n_hit, n_crossing: views of the last entries of ``hit_at`` and ``crossing_at``
         done: sweeps over the contacts so far, shape (1,)
         again: whether another is needed, shape (1,)
-        found: whether stage 4 has anything to close and to search, shape (2,)
+        found: whether stage 4 has anything to close and to search, shape (2,); after impulses 1:
+            the bodies are no longer where they were looked at
         deep_found: whether it had anything to search since the frame began, shape (1,)
         s: displacement vectors [m], shape (n_vert,)
         area: areas of comparison [m^2], shape (n_vert,)
@@ -61,7 +62,7 @@ class Work:
     capacity: Capacity
     dt: wp.array
     steps: wp.array
-    ones: wp.array
+    awake: Awake
     mask: wp.array
     f_tet: wp.array
     x: wp.array
@@ -110,7 +111,18 @@ class Work:
     pair_total: wp.array
 
 
-def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
+def everything(model: Model) -> Awake:
+    """Nothing sleeps."""
+    return Awake(
+        bodies=wp.full(model.n_body, 1, dtype=int),
+        tets=wp.full(model.n_tet, 1, dtype=int),
+        inv_mass=model.inv_mass,
+    )
+
+
+def allocate_work(
+    model: Model, state: State, capacity: Capacity, awake: Awake | None = None
+) -> Work:
     """Room for a step on the current device; the Bvhs are built around ``state.x``."""
     n, m = model.n_vert, capacity.contacts
     lower, upper = _vectors(model.n_body), _vectors(model.n_body)
@@ -126,7 +138,7 @@ def allocate_work(model: Model, state: State, capacity: Capacity) -> Work:
         capacity=capacity,
         dt=wp.zeros(1, dtype=float),
         steps=wp.zeros(1, dtype=int),
-        ones=wp.full(model.n_tet, 1, dtype=int),
+        awake=awake or everything(model),
         mask=_ints(model.n_tet),
         f_tet=wp.zeros((model.n_tet, 4), dtype=wp.vec3),
         x=_vectors(n),
@@ -226,6 +238,7 @@ def _allocate_candidates(model: Model, capacity: Capacity) -> Candidates:
         x=_vectors(model.n_vert),
         skin=_floats(model.n_body),
         motion=_floats(model.n_body),
+        pace=_floats(model.n_body),
         fastest=_floats(1),
         total=_ints(1),
         stale=wp.full(1, 1, dtype=int),

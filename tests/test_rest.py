@@ -1,0 +1,134 @@
+"""rest.py: bodies at rest sleep, wake before anything touches them, and little changes by it."""
+
+import numpy as np
+import pytest
+
+from warp_contact import NeoHookean, Scene, Simulation, box
+from warp_contact.kernels.rest import STILL
+from warp_contact.types import Capacity
+
+RUBBER = NeoHookean(3e4, 0.3, 1000.0, 1e-2)
+EDGE = 0.05  # m, about that of the blocks
+
+
+def tower(blocks: int = 2) -> Scene:
+    """Blocks on each other, slightly apart, and one that is alone."""
+    scene = Scene()
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    for k in range(blocks):
+        scene.add_body(box(0.1, 2), RUBBER, (0.01 * (k % 2), 0.0, 0.0502 + 0.1004 * k))
+    scene.add_body(box(0.1, 2), RUBBER, (1.0, 0.0, 0.0502), label="alone")
+    return scene
+
+
+def asleep(sim: Simulation) -> int:
+    return int((sim._work.awake.bodies.numpy() == 0).sum())
+
+
+def run(sim: Simulation, frames: int) -> Simulation:
+    for _ in sim.frames(frames):
+        pass
+    return sim
+
+
+def settled(scene: Scene, **others) -> Simulation:
+    """A simulation of which all bodies have fallen asleep."""
+    sim = Simulation(scene, **others)
+    for _ in sim.frames(600):
+        if asleep(sim) == len(scene.bodies):
+            return sim
+    raise AssertionError(f"{asleep(sim)} bodies asleep after 10 s")
+
+
+def test_a_tower_falls_asleep_and_stays_what_it_was():
+    sim = settled(tower())
+    other = run(Simulation(tower(), sleeping=False), sim.frame)
+    assert asleep(other) == 0
+    # What it still moved when it fell asleep, both ways.
+    assert np.abs(sim.positions() - other.positions()).max() < 2.0 * STILL * EDGE
+    # A block's weight squeezes it by 0.03 of its edge, 15 times what may still move.
+    expected = other.measure().forces
+    assert sim.measure().forces == pytest.approx(expected, rel=0.02) and len(expected) == 3
+    before = sim.positions(), sim.contact_fields()["pressure"]
+    energy = sim.measure().energy
+    run(sim, 5)
+    np.testing.assert_array_equal(sim.positions(), before[0])
+    np.testing.assert_array_equal(sim.contact_fields()["pressure"], before[1])
+    assert sim.measure().energy == energy
+    assert not sim.velocities().any()
+
+
+def test_what_sleeps_wakes_before_it_is_hit():
+    """On a plane without friction: the momentum along it is that of the block that comes."""
+
+    def scene() -> Scene:
+        scene = Scene(friction=0.0)
+        scene.add_plane((0.0, 0.0, 1.0), 0.0)
+        scene.add_body(box(0.1, 2), RUBBER, (0.0, 0.0, 0.0502))
+        scene.add_body(box(0.1, 2), RUBBER, (-1.0, 0.0, 0.0502), velocity=(0.7, 0.0, 0.0))
+        return scene
+
+    sim, other = Simulation(scene()), Simulation(scene(), sleeping=False)
+    slept = 0
+    for _ in range(90):  # it arrives after 1.3 s
+        sim.step_frame()
+        other.step_frame()
+        slept = max(slept, asleep(sim))
+    assert slept == 1 and asleep(sim) == 0
+    assert sim.velocities(0).mean(axis=0)[0] > 0.3
+    # Nothing is lost by its sleep: a vibration that stopped in it moves the impact by 1e-5 m.
+    np.testing.assert_allclose(sim.positions(), other.positions(), atol=2e-5)
+    assert sim.measure().momentum[0] == pytest.approx(0.7, rel=1e-5)  # 1 kg
+
+
+def test_a_velocity_that_is_given_wakes_up_and_a_slow_press_is_not_stopped():
+    scene = tower(1)
+    press = scene.add_body(box(0.1, 1), RUBBER, (0.0, 0.0, 0.16), fixed=True)
+    sim = run(Simulation(scene), 60)
+    assert asleep(sim) == 3
+    slow = 0.5 * STILL * EDGE  # m/s: less in half a second than a body at rest may move
+    sim.set_velocity(press, (0.0, 0.0, -slow))
+    start = sim.positions(press)
+    run(sim, 90)
+    assert asleep(sim) == 2
+    moved = (start - sim.positions(press))[:, 2]
+    np.testing.assert_allclose(moved, 1.5 * slow, rtol=0.1)  # rounding in each step
+    sim.set_velocity(0, (0.0, 0.0, 1e-9))
+    run(sim, 1)
+    assert asleep(sim) == 1
+
+
+def test_without_weight_or_when_told_not_to_nothing_sleeps():
+    floating = Scene(gravity=(0.0, 0.0, 0.0))
+    floating.add_body(box(0.1, 2), RUBBER, velocity=(1e-5, 0.0, 0.0))
+    sim = run(Simulation(floating), 60)
+    assert asleep(sim) == 0 and sim.measure().momentum[0] == pytest.approx(1e-5, rel=1e-6)
+    assert asleep(run(Simulation(tower(1), sleeping=False), 60)) == 0
+
+
+def test_a_checkpoint_holds_who_sleeps(tmp_path):
+    def scene() -> Scene:
+        scene = tower(1)
+        high = scene.add_body(box(0.1, 2), RUBBER, (0.02, 0.0, 0.5), velocity=(0.0, 0.0, 7.4))
+        assert high.index == 2
+        return scene
+
+    sim = Simulation(scene())
+    run(sim, 86)
+    assert asleep(sim) == 2
+    sim.save(tmp_path / "run.npz")
+    later = Simulation(scene())
+    later.load(tmp_path / "run.npz")
+    assert later.measure().forces == sim.measure().forces != {}
+    run(sim, 10), run(later, 10)  # it falls on one of them
+    assert asleep(sim) == asleep(later) == 1
+    np.testing.assert_array_equal(sim.positions(), later.positions())
+    assert sim.measure().forces == later.measure().forces
+
+
+def test_a_buffer_that_grows_leaves_the_forces_of_those_asleep():
+    sim = settled(tower(1))
+    before = sim.measure().forces
+    sim._work.contacts.needed.fill_(sim._work.capacity.pairs + 1)
+    assert sim._grow() and sim._work.capacity.pairs > Capacity().pairs
+    assert sim.measure().forces == before != {}

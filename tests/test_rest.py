@@ -31,9 +31,9 @@ def run(sim: Simulation, frames: int) -> Simulation:
     return sim
 
 
-def settled(scene: Scene, **others) -> Simulation:
+def settled(scene: Scene) -> Simulation:
     """A simulation of which all bodies have fallen asleep."""
-    sim = Simulation(scene, **others)
+    sim = Simulation(scene, sleeping=True)
     for _ in sim.frames(600):
         if asleep(sim) == len(scene.bodies):
             return sim
@@ -42,7 +42,7 @@ def settled(scene: Scene, **others) -> Simulation:
 
 def test_a_tower_falls_asleep_and_stays_what_it_was():
     sim = settled(tower())
-    other = run(Simulation(tower(), sleeping=False), sim.frame)
+    other = run(Simulation(tower()), sim.frame)
     assert asleep(other) == 0
     # What it still moved when it fell asleep, both ways.
     assert np.abs(sim.positions() - other.positions()).max() < 2.0 * STILL * EDGE
@@ -68,7 +68,7 @@ def test_what_sleeps_wakes_before_it_is_hit():
         scene.add_body(box(0.1, 2), RUBBER, (-1.0, 0.0, 0.0502), velocity=(0.7, 0.0, 0.0))
         return scene
 
-    sim, other = Simulation(scene()), Simulation(scene(), sleeping=False)
+    sim, other = Simulation(scene(), sleeping=True), Simulation(scene())
     slept = 0
     for _ in range(90):  # it arrives after 1.3 s
         sim.step_frame()
@@ -84,7 +84,7 @@ def test_what_sleeps_wakes_before_it_is_hit():
 def test_a_velocity_that_is_given_wakes_up_and_a_slow_press_is_not_stopped():
     scene = tower(1)
     press = scene.add_body(box(0.1, 1), RUBBER, (0.0, 0.0, 0.16), fixed=True)
-    sim = run(Simulation(scene), 60)
+    sim = run(Simulation(scene, sleeping=True), 60)
     assert asleep(sim) == 3
     slow = 0.5 * STILL * EDGE  # m/s: less in half a second than a body at rest may move
     sim.set_velocity(press, (0.0, 0.0, -slow))
@@ -98,12 +98,12 @@ def test_a_velocity_that_is_given_wakes_up_and_a_slow_press_is_not_stopped():
     assert asleep(sim) == 1
 
 
-def test_without_weight_or_when_told_not_to_nothing_sleeps():
+def test_without_weight_or_unless_told_to_nothing_sleeps():
     floating = Scene(gravity=(0.0, 0.0, 0.0))
     floating.add_body(box(0.1, 2), RUBBER, velocity=(1e-5, 0.0, 0.0))
-    sim = run(Simulation(floating), 60)
+    sim = run(Simulation(floating, sleeping=True), 60)
     assert asleep(sim) == 0 and sim.measure().momentum[0] == pytest.approx(1e-5, rel=1e-6)
-    assert asleep(run(Simulation(tower(1), sleeping=False), 60)) == 0
+    assert asleep(run(Simulation(tower(1)), 60)) == 0
 
 
 def test_a_checkpoint_holds_who_sleeps(tmp_path):
@@ -113,11 +113,11 @@ def test_a_checkpoint_holds_who_sleeps(tmp_path):
         assert high.index == 2
         return scene
 
-    sim = Simulation(scene())
+    sim = Simulation(scene(), sleeping=True)
     run(sim, 86)
     assert asleep(sim) == 2
     sim.save(tmp_path / "run.npz")
-    later = Simulation(scene())
+    later = Simulation(scene(), sleeping=True)
     later.load(tmp_path / "run.npz")
     assert later.measure().forces == sim.measure().forces != {}
     run(sim, 10), run(later, 10)  # it falls on one of them

@@ -111,7 +111,7 @@ def add_run(group) -> None:
         dest="settings",
         help="arguments of the scene's build(): a Python literal or else a string",
     )
-    add("--no-sleep", action="store_true", help="step bodies at rest like all others")
+    add("--sleep", action="store_true", help="leave bodies at rest alone until something comes")
     add("--resume", action="store_true", help="go on from DIR/checkpoint.npz, up to frame N")
     add("--quiet", action="store_true", help="no progress line and no summary")
     add("--flatten", action="store_true", help="also write everything into one .usdc")

@@ -48,7 +48,7 @@ def run(args) -> int:
             fps=args.fps,
             substeps=args.substeps,
             device=args.device,
-            sleeping=not args.no_sleep,
+            sleeping=args.sleep,
         )
         view = getattr(module, "VIEW", None)
         view = (view["eye"], view["target"]) if view else None

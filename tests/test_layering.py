@@ -14,9 +14,9 @@ LADDER = (  # a module imports from lower rungs only
     {"kernels"},
     {"topology", "errors", "progress", "response", "types", "usd_scene", "materials"}
     | {"pictures", "launch"},
-    {"mesh", "work", "forces", "usd", "checkpoint", "raycast"},
+    {"mesh", "work", "forces", "usd", "checkpoint", "raycast", "diagnosis"},
     {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"}
-    | {"rest"},
+    | {"rest", "fields"},
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},
     {"solver"},
     {"simulation"},

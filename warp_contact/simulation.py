@@ -10,7 +10,9 @@ import warp as wp
 
 from warp_contact import checkpoint, solver
 from warp_contact.assemble import assemble
+from warp_contact.diagnosis import flattest_tet, lost_vertex, vertex_name
 from warp_contact.errors import SimulationError
+from warp_contact.fields import contact_fields
 from warp_contact.forces import stages_for
 from warp_contact.measure import Measure, Meter
 from warp_contact.progress import Progress
@@ -31,7 +33,7 @@ from warp_contact.work import Work, allocate_work
 
 UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
 HALVED = 3  # times that the steps of a frame are halved because its state did not stay finite
-ATTEMPTS = 12  # at a frame, with larger buffers or shorter steps each time
+ATTEMPTS = 12  # at a frame, with shorter steps each time
 
 
 class Simulation:
@@ -144,14 +146,17 @@ class Simulation:
             last, halved = self.substeps, 0
             for _attempt in range(ATTEMPTS):
                 dt = self._run(omega, rate, last)
-                if self._grow():
+                while self._grow():
                     self._restore()
-                    continue
-                lost = self._lost_vertex()
+                    dt = self._run(omega, rate, last)
+                lost = lost_vertex(self.state)
                 if lost is not None:
                     self._restore()
-                    if self._wanted or halved == HALVED or self._lost_vertex() is not None:
-                        raise self._no_longer_finite(lost)
+                    if self._wanted or halved == HALVED or lost_vertex(self.state) is not None:
+                        raise SimulationError(
+                            f"frame {self.frame + 1}: {vertex_name(self.model, lost)} is no longer "
+                            f"finite ({self.substeps} substeps)"
+                        )
                     halved += 1
                     omega, rate = 2.0 * omega, 2.0 * rate
                     continue
@@ -210,23 +215,7 @@ class Simulation:
         The partner is a body's index, n_body + p for plane p, -1 for none; it and the penetration
         are those of the last step, found at its predicted positions. Shapes (n_vert,).
         """
-        c = self._work.contacts
-        n = int(c.n.numpy()[0])
-        vert, coef = c.vert.numpy()[:n], c.coef.numpy()[:n]
-        pair, depth = c.pair.numpy()[:n], c.depth.numpy()[:n]
-        penetration = np.zeros(self.model.n_vert, dtype=np.float32)
-        partner = np.full(self.model.n_vert, -1, dtype=np.int32)
-        for k in range(5):
-            on = coef[:, k] != 0.0
-            np.maximum.at(penetration, vert[on, k], depth[on])
-            partner[vert[on, k]] = pair[on, 1 if k < 2 else 0]
-        impulse = np.linalg.norm(self._work.impulse.numpy(), axis=1)
-        pressure = impulse * self.fps / np.maximum(self._vertex_area(), 1e-30)
-        return {
-            "pressure": pressure.astype(np.float32),
-            "penetration": penetration,
-            "partner": partner,
-        }
+        return contact_fields(self.model, self.state.x, self._work, 1.0 / self.fps)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write a checkpoint: a run that goes on from it gives the bits of one never interrupted.
@@ -309,7 +298,8 @@ class Simulation:
         if isinstance(self.response, Penalty):
             omega = with_penalty(omega, self.response.stiffness, self._largest_inv_mass)
         if not math.isfinite(omega):
-            raise SimulationError(f"frame {self.frame + 1}: {self._flattest()}: no step is stable")
+            tet = flattest_tet(self.model, self.state.x)
+            raise SimulationError(f"frame {self.frame + 1}: {tet} is too flat: no step is stable")
         v = self.state.v.numpy()
         speed = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0)))
         speed += float(np.linalg.norm(self.model.gravity)) / self.fps
@@ -350,19 +340,6 @@ class Simulation:
         """Largest frequency of the elastic forces and largest damping rate, at the state [1/s]."""
         return self._spectrum.omega(self.state.x), self._spectrum.damping_rate(self.state.x)
 
-    def _lost_vertex(self) -> int | None:
-        """The first vertex whose state is not finite."""
-        finite = np.isfinite(self.state.x.numpy()).all(1) & np.isfinite(self.state.v.numpy()).all(1)
-        return None if finite.all() else int((~finite).argmax())
-
-    def _no_longer_finite(self, vertex: int) -> SimulationError:
-        body = int(self.model.vert_body.numpy()[vertex])
-        vertex -= int(self.model.body_vert.numpy()[body])
-        return SimulationError(
-            f"frame {self.frame + 1}: body '{self.model.labels[body]}', vertex {vertex} is no "
-            f"longer finite ({self.substeps} substeps)"
-        )
-
     def _range(self, body: Body | int | None) -> slice:
         if body is None:
             return slice(None)
@@ -372,24 +349,6 @@ class Simulation:
 
     def _label(self, body: Body | int) -> str:
         return self.model.labels[body.index if isinstance(body, Body) else int(body)]
-
-    def _flattest(self) -> str:
-        """Name the tet with the least height: volume over largest face."""
-        m, x = self.model, self.state.x.numpy().astype(np.float64)
-        a, b, c, d = np.moveaxis(x[m.tets.numpy()], 1, 0)
-        faces = ((b, c, d), (a, c, d), (a, b, d), (a, b, c))
-        area = [np.linalg.norm(np.cross(q - p, r - p), axis=1) for p, q, r in faces]
-        volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a))
-        k = int((volume / np.maximum(np.max(area, axis=0), 1e-30)).argmin())
-        body = int(m.vert_body.numpy()[m.tets.numpy()[k, 0]])
-        return f"body '{m.labels[body]}', tet {k - int(m.body_tet.numpy()[body])} is too flat"
-
-    def _vertex_area(self) -> np.ndarray:
-        """A third of the surface around each vertex [m^2], shape (n_vert,)."""
-        tris, x = self.model.tris.numpy(), self.state.x.numpy().astype(np.float64)
-        a, b, c = np.moveaxis(x[tris], 1, 0)
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-        return np.bincount(tris.ravel(), np.repeat(area, 3), minlength=self.model.n_vert)
 
 
 def _device(name: str | None) -> wp.Device:

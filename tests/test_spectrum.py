@@ -5,6 +5,7 @@ import pytest
 import warp as wp
 
 from warp_contact import forces
+from warp_contact import spectrum as spectrum_file
 from warp_contact.materials import Corotated, NeoHookean, SpringNetwork
 from warp_contact.spectrum import Spectrum
 
@@ -140,3 +141,17 @@ def test_positions_that_are_not_finite_give_infinity_and_leave_no_trace(blob, bu
     spectrum = Spectrum(model)
     assert spectrum.omega(bad) == np.inf
     assert spectrum.omega(y) == Spectrum(model).omega(y)
+
+
+def test_rates_are_found_again_when_something_has_moved(blob, build_model):
+    x, tets = blob((4, 3, 2))
+    model = build_model((x, tets, MATERIALS[0]), fixed=[0, 1, 2])
+    model.body_edge = wp.full(1, 1.0, dtype=float)
+    spectrum = Spectrum(model)
+    rates = spectrum.rates(wp.array(x, dtype=wp.vec3))
+    assert min(rates) >= 0.0 and rates[0] > 0.0
+    still = x + 0.9 * spectrum_file.CLOSE
+    assert spectrum.rates(wp.array(still, dtype=wp.vec3)) is rates
+    squeezed = wp.array(x * [1.0, 1.0, 0.5], dtype=wp.vec3)
+    assert spectrum.rates(squeezed)[0] == pytest.approx(Spectrum(model).omega(squeezed), rel=0.05)
+    assert spectrum.rates(wp.full(len(x), np.nan, dtype=wp.vec3))[0] == np.inf

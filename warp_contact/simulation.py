@@ -142,7 +142,7 @@ class Simulation:
             wp.copy(self._saved.v, self.state.v)
             while self._search is None or self._grow():
                 self._search = solver.overlaps(self.model, self.state, self._work)
-            omega, rate = self._rates or self._spectra()
+            omega, rate = self._rates or self._spectrum.rates(self.state.x)
             last, halved = self.substeps, 0
             for _attempt in range(ATTEMPTS):
                 dt = self._run(omega, rate, last)
@@ -160,7 +160,7 @@ class Simulation:
                     halved += 1
                     omega, rate = 2.0 * omega, 2.0 * rate
                     continue
-                after = self._spectra()
+                after = self._spectrum.rates(self.state.x)
                 stable = self._wanted is not None or stays_stable(dt, after[0], rate > 0.0)
                 if stable and stays_damped(dt, rate, after[1]):
                     break
@@ -335,10 +335,6 @@ class Simulation:
     def _restore(self) -> None:
         wp.copy(self.state.x, self._saved.x)
         wp.copy(self.state.v, self._saved.v)
-
-    def _spectra(self) -> tuple[float, float]:
-        """Largest frequency of the elastic forces and largest damping rate, at the state [1/s]."""
-        return self._spectrum.omega(self.state.x), self._spectrum.damping_rate(self.state.x)
 
     def _range(self, body: Body | int | None) -> slice:
         if body is None:

@@ -17,6 +17,7 @@ FIRST, LATER = (3, 8), (1, 2)  # fewest and most restarts in the first call, in 
 NOISE = 0.1  # random part of a restart, so that a mode elsewhere can come up
 SECOND = 0.3  # part of the second mode in a restart, so that it can overtake
 TOLERANCE = 0.02  # gap between the estimate and its bound that ends the restarts, of lambda
+CLOSE = 2e-3  # of an edge: how far vertices may move before the rates are found again
 SEED = 20051125
 
 
@@ -51,6 +52,16 @@ class Spectrum:
         self._noise = wp.array(_unit(noise, model), dtype=wp.vec3)
         self._start: dict[Callable, wp.array] = {}
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
+        self._at: np.ndarray | None = None
+        self._rates = 0.0, 0.0
+
+    def rates(self, x: wp.array) -> tuple[float, float]:
+        """``omega`` and ``damping_rate``, or those of the last call if ``x`` is still ``CLOSE``."""
+        at, edge = x.numpy(), self._model.body_edge.numpy().min()
+        if self._at is None or not np.abs(at - self._at).max() <= CLOSE * edge:
+            self._at = at.copy()
+            self._rates = self.omega(x), self.damping_rate(x)
+        return self._rates
 
     def omega(self, x: wp.array) -> float:
         """Angular frequency [1/s] of the fastest mode at the positions ``x`` [m].
@@ -70,8 +81,11 @@ class Spectrum:
         return self._largest(forces.apply_damping, x)
 
     def starts(self) -> dict[str, np.ndarray]:
-        """What the next calls start from, by the stage they are of; shape (n_vert, 3) each."""
-        return {apply.__name__: start.numpy() for apply, start in self._start.items()}
+        """What the next calls start from."""
+        starts = {apply.__name__: start.numpy() for apply, start in self._start.items()}
+        if self._at is not None:
+            starts |= {"at": self._at, "rates": np.array(self._rates)}
+        return starts
 
     def start_from(self, starts: dict[str, np.ndarray]) -> None:
         """Let the next calls start from what ``starts`` gave."""
@@ -81,6 +95,8 @@ class Spectrum:
             for apply in applies
             if apply.__name__ in starts
         }
+        self._at = starts.get("at")
+        self._rates = tuple(map(float, starts.get("rates", (0.0, 0.0))))
 
     def _largest(self, apply: Callable, x: wp.array) -> float:
         wp.copy(self._x, x)
@@ -108,8 +124,9 @@ class Spectrum:
     def _restart(self, ritz: np.ndarray) -> None:
         """Set row 0 of the basis to a sum of its rows for each body, plus noise."""
         m = self._model
-        padding = ((0, 0), (0, DEPTH - ritz.shape[1]))
-        self._ritz.assign(np.pad(ritz, padding).astype(np.float32))
+        padded = np.zeros((m.n_body, DEPTH), dtype=np.float32)
+        padded[:, : ritz.shape[1]] = ritz
+        self._ritz.assign(padded)
         wp.launch(
             lanczos.restart,
             dim=m.n_vert,

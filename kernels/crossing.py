@@ -88,6 +88,7 @@ def find_crossings(
 def edge_contacts(
     # in
     threads: int,
+    n_pair: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,) edge and body
     edges: wp.array[wp.vec4i],  # (n_edge,)
     vert_body: wp.array[int],  # (n_vert,)
@@ -104,7 +105,7 @@ def edge_contacts(
     pair_of: wp.array[wp.vec2i],  # (capacity,)
 ):
     """For each candidate: its contact, behind those of the vertices."""
-    for k in range(wp.tid(), pair.shape[0], threads):
+    for k in range(wp.tid(), n_pair[0], threads):
         c = n_hit[0] + crossing_at[k]
         if crossing_at[k + 1] == crossing_at[k] or c >= normal.shape[0]:
             continue

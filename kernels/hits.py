@@ -119,6 +119,7 @@ def list_hits(
     # in
     threads: int,
     n_body: int,
+    n_pair: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,)
     hit_at: wp.array[int],  # (capacity + 1,) hits before each candidate
     # out
@@ -127,7 +128,7 @@ def list_hits(
     hit_layer: wp.array[int],  # (contacts,) -1: no depth yet
 ):
     """For each candidate."""
-    for c in range(wp.tid(), pair.shape[0], threads):
+    for c in range(wp.tid(), n_pair[0], threads):
         e = hit_at[c]
         if hit_at[c + 1] == e or e >= hit_vert.shape[0]:
             continue

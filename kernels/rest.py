@@ -3,9 +3,9 @@
 A body is at rest as long as its vertices stay within STILL of where they were when it began, and
 none is faster than FAST. Slower velocities tell little: contacts at rest rattle in their gaps. It
 may sleep when it has been so for some frames, and with it all bodies of its island: those whose
-boxes meet, one after the other. The box of a body awake is grown by the way it may go in a frame,
-so that nothing asleep is touched by anything awake. Bodies of which all vertices are fixed hold
-others, but do not make an island of them.
+boxes meet, one after the other, all grown by the way of the fastest body in a frame. So nothing
+that moves, and nothing that this may push on, reaches what sleeps before the next frame. Bodies of
+which all vertices are fixed hold others, but do not make an island of them.
 """
 
 import warp as wp
@@ -31,19 +31,20 @@ def watch(
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out, added to
     moved: wp.array[int],  # (n_body,) 1 when a vertex moved
-    speed: wp.array[float],  # (n_body,) [m/s] largest of a vertex
+    speed: wp.array[float],  # (1,) [m/s] of the fastest vertex
     mobile: wp.array[int],  # (n_body,) 1 when a vertex is not fixed
 ):
     """One thread per vertex: a fixed one that is given a velocity always moves."""
     i = wp.tid()
     m = vert_body[i]
     u = wp.length(v[i])
-    wp.atomic_max(speed, m, u)
+    wp.atomic_max(speed, 0, u)
     if inv_mass[i] > 0.0:
         mobile[m] = 1
     elif u > 0.0:
         moved[m] = 1
-    if wp.length(x[i] - anchor[i]) > STILL * body_edge[m] or time * u > FAST * body_edge[m]:
+    near = wp.length(x[i] - anchor[i]) <= STILL * body_edge[m]  # not so for what is not a number
+    if not near or time * u > FAST * body_edge[m]:
         moved[m] = 1
 
 
@@ -70,7 +71,7 @@ def count_rest(
     gravity: float,  # [m/s^2]
     body_edge: wp.array[float],  # (n_body,) [m]
     moved: wp.array[int],  # (n_body,)
-    speed: wp.array[float],  # (n_body,) [m/s]
+    speed: wp.array[float],  # (1,) [m/s]
     # in, out
     frames: wp.array[int],  # (n_body,) at rest so far
     # out
@@ -81,7 +82,7 @@ def count_rest(
     m = wp.tid()
     frames[m] = wp.where(moved[m] == 1, 0, wp.min(frames[m] + 1, wanted))
     awake[m] = wp.where(frames[m] < wanted, 1, 0)
-    reach[m] = TOUCH * body_edge[m] + time * (speed[m] + time * gravity)
+    reach[m] = TOUCH * body_edge[m] + time * (speed[0] + time * gravity)
 
 
 @wp.kernel
@@ -118,16 +119,17 @@ def pause_vertices(
     # out
     pliant: wp.array[float],  # (n_vert,) [1/kg] inv_mass, 0 asleep
     v: wp.array[wp.vec3],  # (n_vert,) [m/s] 0 asleep
-    impulse: wp.array[wp.vec3],  # (n_vert,) [N s] of the frame: 0 awake, the last one asleep
+    impulse: wp.array[wp.vec3],  # (n_vert,) [N s] of the frame: the last one asleep, else 0
 ):
-    """One thread per vertex."""
+    """One thread per vertex; on fixed ones, what is awake may press in every frame."""
     i = wp.tid()
+    pliant[i] = 0.0
     if awake[vert_body[i]] == 1:
         pliant[i] = inv_mass[i]
-        impulse[i] = wp.vec3(0.0, 0.0, 0.0)
     else:
-        pliant[i] = 0.0
         v[i] = wp.vec3(0.0, 0.0, 0.0)
+    if awake[vert_body[i]] == 1 or inv_mass[i] == 0.0:
+        impulse[i] = wp.vec3(0.0, 0.0, 0.0)
 
 
 @wp.kernel

@@ -20,4 +20,4 @@ def sort(values: wp.array[int], first: int, end: int):
                 values[k] = values[wp.max(k - gap, 0)]
                 k -= gap
             values[k] = value
-        gap = gap * 5 // 11
+        gap = gap // 2

@@ -54,6 +54,20 @@ def build(speed: float = 8.0):
     return scene
 '''
 
+RESTING = """
+import warp_contact as wc
+
+
+def build(high):
+    rubber = wc.NeoHookean(3e4, 0.3, 1000.0, 1e-2)
+    scene = wc.Scene()
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    scene.add_body(wc.box(0.1, 2), rubber, (0.0, 0.0, 0.0502))
+    far, up = (0.0, 3.3) if high < 1.0 else (5.0, 0.0)
+    scene.add_body(wc.box(0.1, 2), rubber, (far, 0.0, high), velocity=(0.0, 0.0, up))
+    return scene
+"""
+
 
 @pytest.fixture
 def thrown(tmp_path):
@@ -181,6 +195,25 @@ def test_a_resumed_run_is_the_run_that_was_never_interrupted(
     passed = [json.loads(line)["tunnelled"] for line in contents(out)[1].splitlines()]
     assert passed[4] == 0
     assert (passed[8] > 0) == (response == "penalty")
+
+
+@pytest.mark.parametrize("high", [0.6, 20.0])
+def test_a_run_in_which_bodies_sleep_is_resumed_like_any_other(tmp_path, monkeypatch, high, capsys):
+    """One block lies still and sleeps, the other falls onto it, or far away."""
+    path = tmp_path / "resting.py"
+    path.write_text(RESTING)
+    monkeypatch.setattr(commands, "SAVE_EVERY", 0.0)
+    command = ["run", str(path), "--sleep", "--frames", "50", "--set", f"high={high}", "--out"]
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    assert cli.main([*command, str(whole)]) == 0
+    interrupted(monkeypatch, "step_frame", 42, [*command, str(out)])
+    with np.load(out / "checkpoint.npz") as checkpoint:
+        assert checkpoint["rest.awake"].tolist() == [0, 1]
+    assert cli.main([*command, str(out), "--resume"]) == 0
+    assert contents(out) == contents(whole)
+    capsys.readouterr()
+    assert cli.main([*command[:2], *command[3:], str(out), "--resume"]) == 2
+    assert "of other settings" in complaint(capsys)
 
 
 def test_a_finished_run_is_continued_or_left_as_it_is(tmp_path, thrown):

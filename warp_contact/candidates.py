@@ -140,16 +140,8 @@ def _find_tets(model: Model, work: Work) -> None:
         wp.launch(
             hashing.visit_planes,
             dim=model.n_surf,
-            inputs=[
-                model.n_tet,
-                c.skin,
-                work.awake.bodies,
-                model.surf,
-                model.vert_body,
-                model.plane_n,
-                model.plane_h,
-                c.x,
-            ],
+            inputs=[model.n_tet, c.skin, work.awake.bodies, model.surf, model.vert_body]
+            + [model.plane_n, model.plane_h, c.x],
             outputs=[c.vert_tet, c.n_found],
         )
     _by_pair(c.n_found, c.vert_tet, model.tet_body, c.verts, work.contacts.needed[2:4])

@@ -54,13 +54,14 @@ def run(args) -> int:
         view = (view["eye"], view["target"]) if view else None
         root = root_path(args.out)
         saved, metrics = root.with_name("checkpoint.npz"), root.with_name("metrics.jsonl")
-        if args.resume:
-            go_on(sim, root, saved, metrics)
-        else:
-            saved.unlink(missing_ok=True)
+        kept = go_on(sim, root, saved, metrics) if args.resume else 0
         writer = UsdWriter(root, sim, flatten=args.flatten, view=view, resume=args.resume)
     except ValueError as error:
         raise UsageError(str(error)) from error
+    if args.resume:
+        os.truncate(metrics, kept)
+    else:
+        saved.unlink(missing_ok=True)
     left = max(0, n - sim.frame)
     with (
         writer,
@@ -83,8 +84,8 @@ def run(args) -> int:
     return 0
 
 
-def go_on(sim, root: Path, saved: Path, metrics: Path) -> None:
-    """Take an earlier run up at its checkpoint; lines of metrics after it are removed.
+def go_on(sim, root: Path, saved: Path, metrics: Path) -> int:
+    """Take an earlier run up at its checkpoint; return how much of the metrics it keeps [bytes].
 
     Raises:
         OSError: a file of the run cannot be read
@@ -106,7 +107,7 @@ def go_on(sim, root: Path, saved: Path, metrics: Path) -> None:
     # Of what is measured, these are sums on the host, the same for every device.
     if not same or any(begun[k] != first[k] for k in ("kinetic", "momentum", "angular_momentum")):
         raise ValueError(f"{saved} is of a run with other bodies, or placed or moved otherwise")
-    os.truncate(metrics, sum(map(len, lines)))
+    return sum(map(len, lines))
 
 
 def record(sim, writer: UsdWriter, log):

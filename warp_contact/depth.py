@@ -57,7 +57,7 @@ def edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
     launch_over(
         crossing.edge_contacts,
         work.capacity.edges,
-        inputs=[c.pair, model.edges, model.vert_body, work.n_hit]
+        inputs=[c.n, c.pair, model.edges, model.vert_body, work.n_hit]
         + [work.crossing_at, work.crossing, x0],
         outputs=_records(work),
     )

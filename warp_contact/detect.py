@@ -25,7 +25,7 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
     launch_over(
         hits.list_hits,
         work.capacity.verts,
-        inputs=[model.n_body, c.pair, work.hit_at],
+        inputs=[model.n_body, c.n, c.pair, work.hit_at],
         outputs=[work.hit_vert, work.hit_body, work.hit_layer],
     )
 

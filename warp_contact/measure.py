@@ -186,7 +186,8 @@ class Meter:
         if depth[k] <= 0.0:
             return 0.0, None, 0
         own = model.vert_body.numpy()[first]
-        deep = depth > UNHELD * model.body_edge.numpy()[own]
+        awake = work.awake.bodies.numpy()[own] == 1  # the others are held
+        deep = awake & (depth > UNHELD * model.body_edge.numpy()[own])
         unheld = np.setdiff1d(first[: model.n_surf][deep[: model.n_surf]], self._held(work))
         return float(depth[k]), (self.names[own[k]], self.names[partner[k]]), len(unheld)
 

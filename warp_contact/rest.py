@@ -1,9 +1,10 @@
 """Bodies that are at rest sleep: nothing is computed for them until something comes near.
 
 What sleeps stays within ``kernels.rest.STILL`` of an edge of where it was ``REST_TIME`` before; the
-contact forces on it are those of its last frame awake. Momentum and energy change by what motion it
-had left. What creeps slower than ``STILL`` in ``REST_TIME`` is stopped, but for what moves because
-fixed vertices do.
+contact forces and pressures on it are those of its last frame awake, and it counts no contacts.
+Momentum and energy change by what motion it had left. What creeps slower than ``STILL`` in
+``REST_TIME`` is stopped, but for what moves because fixed vertices do. ``Simulation.set_velocity``
+wakes a body; a small velocity written into ``Simulation.state`` is lost on one that sleeps.
 
 Only for scenes with gravity: what stays where it is although it has weight is held.
 """
@@ -32,26 +33,32 @@ class Rest:
             inv_mass=wp.clone(model.inv_mass),
         )
         self._time = 1.0 / fps
-        self._wanted = math.ceil(REST_TIME * fps)
+        self._wanted = max(2, math.ceil(REST_TIME * fps))
         self._anchor = wp.clone(state.x)
         self._frames = wp.zeros(model.n_body, dtype=int)
         self._moved, self._mobile = (wp.zeros(model.n_body, dtype=int) for _ in range(2))
-        self._speed, self._reach = (wp.zeros(model.n_body, dtype=float) for _ in range(2))
+        self._reach = wp.zeros(model.n_body, dtype=float)
+        self._speed = wp.zeros(1, dtype=float)
         self._again = wp.zeros(1, dtype=int)
         self._before = np.ones(model.n_body, dtype=np.int32)  # awake in the last frame
 
     def values(self, work: Work) -> dict[str, np.ndarray]:
         """What another one needs to go on from here."""
+        awake = np.append(self.awake.bodies.numpy() == 1, np.zeros(self.model.n_plane, dtype=bool))
+        key, total = work.pair_key.numpy(), work.pair_total.numpy()
+        key, total = key[key >= 0], total[key >= 0]
+        kept = ~awake[key >> 32] & ~awake[key & 0xFFFFFFFF]
+        asleep = ~awake[self.model.vert_body.numpy()]
         return {
             "anchor": self._anchor.numpy(),
             "frames": self._frames.numpy(),
             "awake": self.awake.bodies.numpy(),
-            "impulse": work.impulse.numpy(),
-            "pair_key": work.pair_key.numpy(),
-            "pair_total": work.pair_total.numpy(),
+            "impulse": np.where(asleep[:, None], work.impulse.numpy(), np.float32(0.0)),
+            "pair_key": key[kept],
+            "pair_total": total[kept],
         }
 
-    def go_on(self, values: dict[str, np.ndarray], state: State, work: Work) -> None:
+    def restore(self, values: dict[str, np.ndarray], work: Work) -> None:
         """Take over the ``values`` of another one; ``work`` has room for its pairs."""
         n = len(values["pair_key"])
         self._anchor.assign(values["anchor"])
@@ -60,9 +67,9 @@ class Rest:
         self._before = values["awake"]
         self._pause(work)
         work.impulse.assign(values["impulse"])
-        work.pair_key[:n].assign(values["pair_key"])
-        work.pair_total[:n].assign(values["pair_total"])
-        self.begin_frame(state, work)
+        if n:
+            work.pair_key[:n].assign(values["pair_key"])
+            work.pair_total[:n].assign(values["pair_total"])
 
     def wake(self, body: int) -> None:
         """Let a body's rest begin anew."""
@@ -124,6 +131,11 @@ class Rest:
             inputs=[work.bodies.id, self.model.body_world, work.lower, work.upper, self._mobile],
             outputs=[self.awake.bodies, self._again],
         )
+
+    def skip_frame(self, state: State, work: Work) -> None:
+        """Stop everything."""
+        state.v.zero_()
+        work.contacts.n.zero_()
 
     def begin_frame(self, state: State, work: Work) -> None:
         """Stop who sleeps, and forget the contact forces of all others."""

@@ -134,10 +134,11 @@ class Simulation:
         that came, is repeated from its start: nothing is lost.
         """
         with wp.ScopedDevice(self.device):
-            if self._rest and not self._rest.update(self.state, self._work):
-                self._rest.begin_frame(self.state, self._work)
-                self.frame += 1
-                return
+            if self._rest and self._search is False:  # an overlap that is left has to be searched
+                if not self._rest.update(self.state, self._work):
+                    self._rest.skip_frame(self.state, self._work)
+                    self.frame += 1
+                    return
             wp.copy(self._saved.x, self.state.x)
             wp.copy(self._saved.v, self.state.v)
             while self._search is None or self._grow():
@@ -257,7 +258,7 @@ class Simulation:
             capacity = replace(capacity, pairs=max(capacity.pairs, room))
             self._work = self._allocate(self.state, capacity)
             if self._rest:
-                self._rest.go_on(rest, self.state, self._work)
+                self._rest.restore(rest, self._work)
         self._graphs.clear()
         self.frame, self.substeps = int(values["frame"]), int(values["substeps"])
         self._search = bool(values["search"]) if "search" in values else None

@@ -239,7 +239,7 @@ class Simulation:
         checkpoint.write(path, self._fingerprint(), values)
 
     def load(self, path: str | os.PathLike) -> None:
-        """Go on from a checkpoint. What is measured of the last frame is empty until the next.
+        """Go on from a checkpoint. Until the next frame, contacts are measured of bodies asleep only.
 
         Raises:
             OSError: it cannot be read

@@ -12,7 +12,7 @@ from warp_contact.types import Awake, Candidates, Capacity, Contacts, Model, Pai
 
 @dataclass
 class Work:
-    """Arrays that a step fills and forgets.
+    """Arrays that a step fills and forgets; but for the impulses of bodies asleep, see rest.py.
 
     Attributes:
         capacity: what there is room for

@@ -239,7 +239,7 @@ class Simulation:
         checkpoint.write(path, self._fingerprint(), values)
 
     def load(self, path: str | os.PathLike) -> None:
-        """Go on from a checkpoint. Until the next frame, contacts are measured of bodies asleep only.
+        """Go on from a checkpoint; until the next frame, only bodies asleep have contact forces.
 
         Raises:
             OSError: it cannot be read

@@ -27,6 +27,7 @@ method, except at a contact where that change was a step too far. The last sweep
 import warp as wp
 
 from warp_contact.kernels.contact import REST, gap, gradient
+from warp_contact.kernels.incidence import total
 
 wp.set_module_options({"enable_backward": False})
 
@@ -182,6 +183,8 @@ def solve_contacts(
 def apply_impulses(
     # in
     threads: int,
+    n_touched: wp.array[int],  # (1,)
+    touched: wp.array[int],  # (n_vert,)
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
     part: wp.array[wp.vec3],  # (5 capacity,) [N s]
@@ -190,12 +193,9 @@ def apply_impulses(
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     impulse: wp.array[wp.vec3],  # (n_vert,) [N s] received since the frame began
 ):
-    """For each vertex: gather the impulses of its contacts in their order."""
-    for i in range(wp.tid(), v.shape[0], threads):
-        if start[i] == start[i + 1]:
-            continue
-        p = wp.vec3(0.0, 0.0, 0.0)
-        for e in range(start[i], start[i + 1]):
-            p += part[entry[e]]
+    """For each vertex with contacts: add their impulses."""
+    for k in range(wp.tid(), n_touched[0], threads):
+        i = touched[k]
+        p = total(i, start, entry, part)
         v[i] = v[i] + inv_mass[i] * p
         impulse[i] = impulse[i] + p

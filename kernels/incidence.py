@@ -84,16 +84,33 @@ def sort_entries(
     start: wp.array[int],  # (n_vert + 1,)
     # in, out
     entry: wp.array[int],  # (5 capacity,)
+    # out
+    touched: wp.array[int],  # (n_vert,) vertices with entries, in any order
+    # out, added to
+    n_touched: wp.array[int],  # (1,)
 ):
     """For each vertex: sort its list, which is short."""
     for i in range(wp.tid(), start.shape[0] - 1, threads):
-        sort(entry, start[i], start[i + 1])
+        if start[i] < start[i + 1]:
+            sort(entry, start[i], start[i + 1])
+            touched[wp.atomic_add(n_touched, 0, 1)] = i
+
+
+@wp.func
+def total(i: int, start: wp.array[int], entry: wp.array[int], part: wp.array[wp.vec3]) -> wp.vec3:
+    """Sum of the parts of the contacts of vertex i, in their order."""
+    p = wp.vec3(0.0, 0.0, 0.0)
+    for e in range(start[i], start[i + 1]):
+        p += part[entry[e]]
+    return p
 
 
 @wp.kernel
 def add_parts(
     # in
     threads: int,
+    n_touched: wp.array[int],  # (1,)
+    touched: wp.array[int],  # (n_vert,)
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
     part: wp.array[wp.vec3],  # (5 capacity,) [kg y]
@@ -101,11 +118,8 @@ def add_parts(
     # in, out
     y: wp.array[wp.vec3],  # (n_vert,) positions or velocities
 ):
-    """For each vertex: gather the parts of its contacts in their order."""
-    for i in range(wp.tid(), y.shape[0], threads):
-        if start[i] == start[i + 1] or inv_mass[i] == 0.0:
-            continue
-        p = wp.vec3(0.0, 0.0, 0.0)
-        for e in range(start[i], start[i + 1]):
-            p += part[entry[e]]
-        y[i] = y[i] + inv_mass[i] * p
+    """For each vertex with contacts: add their parts."""
+    for k in range(wp.tid(), n_touched[0], threads):
+        i = touched[k]
+        if inv_mass[i] > 0.0:
+            y[i] = y[i] + inv_mass[i] * total(i, start, entry, part)

@@ -16,11 +16,12 @@ def test_lists_of_every_length_are_sorted(rng, device):
     lists = [rng.permutation(1000)[:n] for n in sizes]
     for threads in (1, 3, len(sizes)):
         entry = ints(np.concatenate(lists))
-        wp.launch(
-            incidence.sort_entries, dim=threads, inputs=[threads, ints(start)], outputs=[entry]
-        )
+        touched, n = ints(np.zeros(len(sizes))), ints([0])
+        inputs, outputs = [threads, ints(start)], [entry, touched, n]
+        wp.launch(incidence.sort_entries, dim=threads, inputs=inputs, outputs=outputs)
         expected = np.concatenate([np.sort(part) for part in lists])
         np.testing.assert_array_equal(entry.numpy(), expected)
+        assert sorted(touched.numpy()[: n.numpy()[0]]) == np.flatnonzero(sizes).tolist()
 
 
 def test_pairs_do_not_depend_on_the_order_in_which_items_were_found(rng, device):

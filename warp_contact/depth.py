@@ -65,7 +65,7 @@ def edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
 
 
 def contacts_by_vertex(model: Model, work: Work) -> None:
-    """Set ``contacts.start`` and ``contacts.entry``."""
+    """Set ``contacts.start``, ``entry`` and ``touched``."""
     c = work.contacts
     m = work.capacity.contacts
     c.start.zero_()
@@ -77,7 +77,9 @@ def contacts_by_vertex(model: Model, work: Work) -> None:
         inputs=[c.n, c.vert, c.coef],
         outputs=[c.start, c.entry],
     )
-    launch_over(incidence.sort_entries, model.n_vert, inputs=[c.start], outputs=[c.entry])
+    c.n_touched.zero_()
+    outputs = [c.entry, c.touched, c.n_touched]
+    launch_over(incidence.sort_entries, model.n_vert, inputs=[c.start], outputs=outputs)
 
 
 def _records(work: Work) -> list[wp.array]:

@@ -141,6 +141,6 @@ def _apply(model: Model, v: wp.array, work: Work) -> None:
     launch_over(
         impulse.apply_impulses,
         model.n_vert,
-        inputs=[c.start, c.entry, c.part, model.inv_mass],
+        inputs=[c.n_touched, c.touched, c.start, c.entry, c.part, model.inv_mass],
         outputs=[v, work.impulse],
     )

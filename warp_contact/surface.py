@@ -150,7 +150,7 @@ def _add_parts(model: Model, c: Contacts, y: wp.array) -> None:
     launch_over(
         incidence.add_parts,
         model.n_vert,
-        inputs=[c.start, c.entry, c.part, model.inv_mass],
+        inputs=[c.n_touched, c.touched, c.start, c.entry, c.part, model.inv_mass],
         outputs=[y],
     )
 

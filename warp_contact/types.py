@@ -227,6 +227,8 @@ class Contacts:
         pair: the two bodies, n_body + p for plane p, shape (capacity,)
         start: first entry of each vertex in ``entry``, shape (n_vert + 1,)
         entry: contacts at each vertex as 5 contact + k, shape (5 capacity,)
+        n_touched: vertices with entries, shape (1,)
+        touched: which ones, in any order, shape (n_vert,)
         weight: sum of coef^2 N / m [1/kg], shape (capacity,)
         closing: approach that is allowed [m/s], negative for an overlap at the start of the step,
             shape (capacity,)
@@ -251,6 +253,8 @@ class Contacts:
     pair: wp.array
     start: wp.array
     entry: wp.array
+    n_touched: wp.array
+    touched: wp.array
     weight: wp.array
     closing: wp.array
     open: wp.array

@@ -279,6 +279,8 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         pair=wp.zeros(m, dtype=wp.vec2i),
         start=_ints(n + 1),
         entry=_ints(5 * m),
+        n_touched=_ints(1),
+        touched=_ints(n),
         weight=_floats(m),
         closing=_floats(m),
         open=_floats(m),

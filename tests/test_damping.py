@@ -35,7 +35,7 @@ def damp(model, x, v, dt: float, stages: int) -> np.ndarray:
     f_tet = wp.full((model.n_tet, 4), wp.vec3(np.nan))  # scratch: whatever it holds
     scratch = tuple(wp.full(model.n_vert, wp.vec3(np.nan)) for _ in range(2))
     x = wp.array(x, dtype=wp.vec3)
-    forces.damp(model, x, v, wp.full(1, dt, dtype=float), f_tet, scratch, stages)
+    forces.damp(model, x, v, model.inv_mass, wp.full(1, dt, dtype=float), f_tet, scratch, stages)
     return v.numpy().astype(float)
 
 
@@ -150,7 +150,7 @@ def test_without_damping_nothing_is_launched(body, build_model, monkeypatch):
     model = build_model((*body, NeoHookean(1e5, 0.3, 1000.0)))
     monkeypatch.setattr(wp, "launch", None)
     x, v, dt, f_tet, w = (wp.zeros(1) for _ in range(5))
-    forces.damp(model, x, v, dt, f_tet, (w, w), 5)
+    forces.damp(model, x, v, model.inv_mass, dt, f_tet, (w, w), 5)
 
 
 def test_damp_replays_from_a_graph(body, rng, build_model):
@@ -161,7 +161,7 @@ def test_damp_replays_from_a_graph(body, rng, build_model):
     f_tet, w = wp.zeros((model.n_tet, 4), dtype=wp.vec3), (wp.zeros_like(v), wp.zeros_like(v))
     dt = wp.full(1, 1.0, dtype=float)
     with wp.ScopedCapture() as capture:
-        forces.damp(model, x, v, dt, f_tet, w, 3)
+        forces.damp(model, x, v, model.inv_mass, dt, f_tet, w, 3)
     dt.fill_(1e-4)
     v.assign(start.astype(np.float32))
     wp.capture_launch(capture.graph)
@@ -213,7 +213,7 @@ def modal_motion(model, x, rest, weight, h: float, stages: int, steps: int):
     with wp.ScopedCapture() as capture:
         forces.internal_forces(model, x, mask, f_tet)
         wp.launch(motion.predict, dim=model.n_vert, inputs=[*gather, x, v], outputs=[unused, v])
-        forces.damp(model, x, v, dt, f_tet, w, stages)
+        forces.damp(model, x, v, model.inv_mass, dt, f_tet, w, stages)
         wp.launch(motion.advance, dim=model.n_vert, inputs=[dt, x, v], outputs=[x])
     q, p = np.empty(steps), np.empty(steps)
     for k in range(steps):

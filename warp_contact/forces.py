@@ -63,25 +63,23 @@ def damp(
     model: Model,
     x: wp.array,
     v: wp.array,
+    inv_mass: wp.array,
     dt: wp.array,
     f_tet: wp.array,
     scratch: tuple[wp.array, wp.array],
     stages: int,
-    inv_mass: wp.array | None = None,
 ) -> None:
     """Damp ``v`` [m/s] over ``dt`` [s], shape (1,), at fixed positions ``x`` [m].
 
     Solves M dv/dt = -C(x) v in ``stages`` stages of ``motion.relax``: stable for
     2 dt lambda_max(M^-1 C) <= stages^2 + stages, see ``stages_for``. Momentum is kept, no mode
-    grows or turns round, vertices whose ``inv_mass`` (that of the model, if None) is 0 keep their
-    velocity. Scratch: ``f_tet``
-    (n_tet, 4) and two arrays (n_vert,). Without a damped body nothing is launched.
+    grows or turns round, vertices with ``inv_mass`` [1/kg] 0 keep their velocity. Scratch:
+    ``f_tet`` (n_tet, 4) and two arrays (n_vert,). Without a damped body nothing is launched.
     """
     if stages == 0 or not any(e.damped for e in model.elements):
         return
     if not all(e.damped for e in model.elements):
         f_tet.zero_()
-    inv_mass = model.inv_mass if inv_mass is None else inv_mass
     last, before = v, v
     for j in range(1, stages + 1):
         apply_damping(model, x, last, f_tet)

@@ -141,9 +141,8 @@ def predict(model: Model, state: State, work: Work, stages: int) -> None:
     to their neighbours before the impulses see them, and rest would depend on the damping.
     """
     if stages > 0:
-        scratch = work.v, work.s
-        inv_mass = work.awake.inv_mass
-        damp(model, state.x, state.v, work.dt, work.f_tet, scratch, stages, inv_mass)
+        scratch, inv_mass = (work.v, work.s), work.awake.inv_mass
+        damp(model, state.x, state.v, inv_mass, work.dt, work.f_tet, scratch, stages)
     kick(model, state, work)
 
 

@@ -70,7 +70,7 @@ def damp_last(model, state, work, stages) -> None:
     solver.kick(model, state, work)
     if stages > 0:
         scratch = work.v, work.s
-        forces.damp(model, state.x, state.v, work.dt, work.f_tet, scratch, stages)
+        forces.damp(model, state.x, state.v, model.inv_mass, work.dt, work.f_tet, scratch, stages)
     solver.drift(model, state, work, work.x)
 
 

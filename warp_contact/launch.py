@@ -1,8 +1,8 @@
 """Launches over lists of which a part is in use, or has much to do.
 
-A thread of Warp's CPU device costs 20 to 50 ns before it does anything: it loads all arguments of
-its kernel. Kernels over lists therefore take the number of their threads and let each have every
-so-manieth entry: on the CPU one thread has them all, on a GPU each has its own.
+On the CPU threads run one after another, and each loads all arguments of its kernel first: more
+than an unused entry is worth. Kernels over lists therefore take the number of their threads and
+let each have every so-manieth entry: on the CPU one thread has them all, on a GPU each has its own.
 """
 
 import warp as wp

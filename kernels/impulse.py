@@ -100,6 +100,8 @@ def begin_contacts(
 
 @wp.kernel
 def next_sweep(
+    # in
+    first: bool,
     # out
     again: wp.array[int],  # (1,) 0
     # in, out
@@ -107,6 +109,8 @@ def next_sweep(
 ):
     """One thread: count a sweep."""
     again[0] = 0
+    if first:
+        done[0] = 0
     done[0] = done[0] + 1
 
 

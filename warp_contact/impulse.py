@@ -58,11 +58,11 @@ def forget(work: Work) -> None:
 
 
 def exchange(model: Model, v: wp.array, work: Work) -> None:
-    """Change ``v`` by normal impulses and friction until no contact approaches; set ``found``."""
+    """Change ``v`` by normal impulses and friction until no contact approaches."""
     c = work.contacts
 
-    def sweep(last: bool = False) -> None:
-        next_sweep(work)
+    def sweep(first: bool = False, last: bool = False) -> None:
+        next_sweep(work, first)
         launch_over(
             impulse.solve_contacts,
             work.capacity.contacts,
@@ -73,16 +73,14 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
         )
         _apply(model, v, work)
 
-    work.done.zero_()
-    wp.copy(work.again, c.n)
+    sweep(first=True)
     wp.capture_while(work.again, sweep)
     sweep(last=True)
-    work.found.fill_(1)
 
 
-def next_sweep(work: Work) -> None:
+def next_sweep(work: Work, first: bool) -> None:
     """Count a sweep over the contacts in ``done`` and clear ``again``."""
-    wp.launch(impulse.next_sweep, dim=1, inputs=[], outputs=[work.again, work.done])
+    wp.launch(impulse.next_sweep, dim=1, inputs=[first], outputs=[work.again, work.done])
 
 
 def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:

@@ -11,7 +11,7 @@ from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.types import Model, State
 from warp_contact.work import Work
 
-LOOKS = 3  # after the closure, at the vertices and edges again, each followed by another closure
+LOOKS = 3  # after a closure over some way, at the vertices and edges again, and another closure
 
 
 def step(
@@ -61,7 +61,8 @@ def step(
         impulse.keep(work)
         impulse.record_vertices(work, unit)
         drift(model, state, work, state.x)
-        wp.capture_if(work.found[0:1], look_again)  # impulses moved what was looked at
+        # The impulses moved what was looked at.
+        wp.capture_if(work.n_crossing if search else work.found[2:3], look_again)
         move_surfaces(model, state, work, response, search)  # what the step did not create
 
     def fly() -> None:
@@ -153,32 +154,35 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
 
 def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Stages 1 and 2: contacts of vertices inside other bodies at the positions ``x``."""
-    work.n_hit.zero_()
-    work.contacts.n.zero_()
 
     def find() -> None:
         detect.find_hits(model, x, work)
+        wp.capture_if(work.n_hit, record, work.contacts.n.zero_)
+
+    def record() -> None:
         depth.hit_depths(model, x, work)
         depth.vertex_contacts(model, x0, x, work, fresh)
         depth.contacts_by_vertex(model, work)
         impulse.begin(model, x0, work, work.none)
 
-    wp.capture_if(work.candidates.verts.n, find)
+    def none() -> None:
+        work.n_hit.zero_()
+        work.contacts.n.zero_()
+
+    wp.capture_if(work.candidates.verts.n, find, none)
 
 
 def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
     """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
-    work.n_crossing.zero_()
-    work.found.zero_()
     look = partial(detect.find_crossings, model, x0, x, work, fresh)
-    wp.capture_if(work.candidates.edges.n, look)
+    wp.capture_if(work.candidates.edges.n, look, work.n_crossing.zero_)
 
     def append() -> None:
         depth.edge_contacts(model, x0, work)
         depth.contacts_by_vertex(model, work)
         impulse.begin(model, x0, work, work.n_hit)
 
-    wp.capture_if(work.n_crossing, append)
+    wp.capture_if(work.n_crossing, append, work.found.zero_)
 
 
 def move_surfaces(
@@ -196,14 +200,18 @@ def move_surfaces(
 
     def close(looks: int = LOOKS) -> None:
         surface.close(model, state.x, state.v, work, search)
-        # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
-        # may cross that it could not see.
-        if looks == LOOKS:
-            vertex_contacts(model, state.x, state.x, work, not search)
-        if looks > 0:
+
+        def look() -> None:
+            # Where vertices came to lie, their triangles may be others than those of stage 2, and
+            # edges may cross that it could not see.
+            if looks == LOOKS:
+                vertex_contacts(model, state.x, state.x, work, not search)
             edge_contacts(model, state.x, state.x, work, not search)
             surface.leftover(model, state.x, work)
             wp.capture_if(work.found[0:1], partial(close, looks - 1))
+
+        if looks > 0:
+            wp.capture_if(work.found[2:3], look)
 
     def resolve() -> None:
         if search:

@@ -57,7 +57,7 @@ def sheet() -> dict[str, float]:
     def counting(function: Callable, number: wp.array) -> Callable:
         def called(*args) -> None:
             function(*args)
-            wp.launch(impulse_kernels.next_sweep, dim=1, inputs=[], outputs=[flag, number])
+            wp.launch(impulse_kernels.next_sweep, dim=1, inputs=[False], outputs=[flag, number])
 
         return called
 

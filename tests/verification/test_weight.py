@@ -25,7 +25,4 @@ def test_three_points_share_the_weight_as_the_moments_say(ask, hold):
 
 @pytest.mark.parametrize("ratio", [1.0, 100.0, 1e4])
 def test_a_light_block_carries_a_heavy_one(ratio, ask, hold):
-    # target 0.1 % and a ripple of 0.5 %, reached 0.13 % and 0.7 % at 1 : 10000: the step follows
-    # the light block, and the heavy one is followed for a quarter of its period only.
-    level = "good" if ratio == 1e4 else "excellent"
-    hold(ladder.carry(ask, ratio), level)
+    hold(ladder.carry(ask, ratio), "excellent")

@@ -20,7 +20,7 @@ CELLS = 2, 3  # of the light and the heavy cube
 GAP = 3e-5  # at the start [m]: about a thousandth of an edge
 FORCE = 0.02, 0.001, 1e-5
 RIPPLE = 0.05, 0.005, 1e-5
-LEAST, MOST = 200, 1500  # frames
+LEAST = 200  # frames
 SAMPLE = 0.5  # part of the frames at the end over which forces are averaged
 BLOCK = 10  # frames in a force of the ripple: one alone is a step or two
 
@@ -47,7 +47,7 @@ def carry(ask: Ask, ratio: float) -> Iterator[Figure]:
     sim = wc.Simulation(scene, respond, fps=step_rate(EDGE / CELLS[1], speed))
     sim.state.x.assign(np.concatenate(static(scene, young, ratio)).astype(np.float32))
     omega = float(np.sqrt(young * EDGE / (ratio * DENSITY * EDGE**3)))
-    frames = int(np.clip(np.ceil(10.0 / omega * sim.fps), LEAST, MOST))
+    frames = max(LEAST, int(np.ceil(10.0 / omega * sim.fps)))
     forces = []
     for frame in relax(sim, omega, frames):
         if frame > (1.0 - SAMPLE) * frames:

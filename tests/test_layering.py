@@ -14,7 +14,7 @@ LADDER = (  # a module imports from lower rungs only
     {"kernels"},
     {"topology", "errors", "progress", "response", "types", "usd_scene", "materials"}
     | {"pictures", "launch"},
-    {"mesh", "work", "forces", "usd", "checkpoint", "raycast", "diagnosis"},
+    {"mesh", "work", "forces", "usd", "checkpoint", "raycast", "diagnosis", "ready"},
     {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"}
     | {"rest", "fields"},
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},

@@ -16,6 +16,7 @@ from warp_contact.fields import contact_fields
 from warp_contact.forces import stages_for
 from warp_contact.measure import Measure, Meter
 from warp_contact.progress import Progress
+from warp_contact.ready import load_kernels
 from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.rest import Rest, keep_forces
 from warp_contact.scene import Body, Scene
@@ -87,6 +88,7 @@ class Simulation:
         self.device = _device(device)
         with wp.ScopedDevice(self.device):
             self.model, self.state = assemble(scene)
+            load_kernels(self.model, self.device)
             self._spectrum = Spectrum(self.model)
             self._meter = Meter(self.model)
             # Without weight, what hardly moves need not be held by anything: it flies.

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from verification import bars, orders
+from verification import bars, chain, orders
 
 
 @pytest.mark.parametrize("name", bars.IMPACTS)
@@ -12,33 +12,37 @@ def test_the_restitution_is_that_of_the_pressure_over_the_contact(name):
     gained = impulse / (impact.lower.density * impact.lower.length)
     if impact.upper:
         gained += impulse / (impact.upper.density * impact.upper.length)
-    # The pressure stays for the plateau and, for unlike bars, in smaller steps until the release.
-    assert gained <= (1.0 + impact.e) * impact.approach * (1.0 + 1e-9)
-    if impact.contact == pytest.approx(impact.plateau):
-        assert gained == pytest.approx((1.0 + impact.e) * impact.approach)
+    # The pressure stays for the plateau, then falls by the same factor at each return of the wave.
+    steps = round(impact.contact / impact.plateau)
+    factor = impact.left ** (1.0 / max(steps - 1, 1))
+    gained *= sum(factor**k for k in range(steps))
+    assert gained == pytest.approx((1.0 + impact.e) * impact.approach, rel=1e-4)
 
 
-def test_a_bar_rebounds_from_a_wall(ask, hold):
-    hold(bars.hit("wall", bars.IMPACTS["on a wall"], ask, bars.ELEMENTS), "excellent")
-
-
-@pytest.mark.parametrize("name", [name for name in bars.IMPACTS if name != "on a wall"])
-def test_bars_press_on_each_other_with_the_pressure_of_the_waves(name, ask, hold):
+@pytest.mark.parametrize("name", bars.IMPACTS)
+def test_bars_press_on_each_other_and_part_as_the_waves_say(name, ask, hold):
     figures = list(bars.hit(name, bars.IMPACTS[name], ask, bars.ELEMENTS))
-    hold([f for f in figures if f.name.startswith("pressure, mean")], "good")
-    # target 0.01, reached 0.002 to 0.29: where the sides of both bars lie flush, corners that slip
-    # beside each other are in contact in some steps only. The way that they come closer in the
-    # others is closed against the pressure, in an impact as slow as this a part of its energy.
-    rise = next(f for f in figures if f.name.startswith("rise"))
-    assert rise.value < 0.6
+    # target 2 % of the time, reached 2.7 % and -3.1 %: the dispersion of the mesh, see below
+    part = {"end of the contact": "good"} if name in ("L2 = 2 L1", "E2 = 16 E1") else {}
+    best = dict.fromkeys(("pressure, mean", "largest pressure afterwards"), "best")
+    found = hold(figures, "excellent", but=best | part)
+    # Reached 0 to 6.2e-6, in flight before the impact (L2 = 2 L1): positions of 2 m in single
+    # precision strain cells of 25 mm by up to 5e-6. Exact contact in double precision has none.
+    assert found["rise of the energy [of that at the start]"] < 1.5e-5
 
 
-@pytest.mark.parametrize("name", ["identical", "L2 = 2 L1"])
-def test_like_bars_part_as_the_waves_say(name, ask, hold):
+@pytest.mark.parametrize("name", [name for name, i in bars.IMPACTS.items() if i.e < 1.0])
+def test_unequal_bars_part_when_exact_contact_on_the_same_mesh_does(name, ask):
     figures = list(bars.hit(name, bars.IMPACTS[name], ask, bars.ELEMENTS))
-    # What the crossings above add, 3 % of the energy here, leaves these figures alone.
-    kept = "restitution", "end of the contact", "energy at the end"
-    hold([f for f in figures if f.name.startswith(kept)], "good")
+    apart = next(f for f in figures if f.name.startswith("end, difference of both"))
+    # Reached 0.019 %, 0.032 % and 0.051 % of 2 L / c; a step is 0.31 %, 0.1 % and 0.1 % of it.
+    assert abs(apart.value) < 0.1
+
+
+def test_exact_contact_wants_vertices_that_face_each_other():
+    scene = bars.build(bars.IMPACTS["identical"], 10, (2, 3))
+    with pytest.raises(ValueError, match="face each other"):
+        chain.collide(scene, 1e-3, [1])
 
 
 def test_the_impact_converges_with_step_and_elements(ask, hold):
@@ -46,7 +50,7 @@ def test_the_impact_converges_with_step_and_elements(ask, hold):
 
 
 def test_sliding_converges_with_the_first_order_of_the_step(ask, hold):
-    hold(orders.sliding(ask), "good")
+    hold(orders.sliding(ask), "excellent")
 
 
 def test_rest_converges_with_the_first_order_of_the_step(ask, hold):

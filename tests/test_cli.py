@@ -11,7 +11,7 @@ import pytest
 
 from warp_contact import cli, commands, usd
 from warp_contact.errors import SimulationError, UsageError
-from warp_contact.progress import Progress, clock
+from warp_contact.progress import Progress, announce, clock
 from warp_contact.shapes import box
 from warp_contact.simulation import Simulation
 from warp_contact.usd_check import problems
@@ -404,17 +404,20 @@ class Terminal(io.StringIO):
 
 def test_progress_is_one_line_on_a_terminal():
     stream = Terminal()
+    announce("loading", stream=stream)
     with Progress(2, stream=stream) as line:
         line.update(1, 1 / 60, 12, 3.4e-5)
         line.update(2, 2 / 60, 9, 0.0)
     text = stream.getvalue()
-    assert text.count("\n") == 1
+    assert text.startswith("loading\n")
+    assert text.count("\n") == 2
     assert "frame 1 (1/2)  t 0.017 s  12 contacts  overlap 3.4e-05 m  0:00 to go" in text
     assert text.rstrip().endswith("done")
 
 
 @pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])
 def test_progress_is_silent_without_a_terminal_or_when_quiet(stream):
+    announce("loading", quiet=stream.isatty(), stream=stream)
     with Progress(1, quiet=stream.isatty(), stream=stream) as line:
         line.update(1, 0.1, 0, 0.0)
     assert stream.getvalue() == ""

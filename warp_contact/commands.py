@@ -17,7 +17,7 @@ import warp as wp
 from warp_contact.errors import UsageError
 from warp_contact.mesh import TetMesh
 from warp_contact.pictures import animate
-from warp_contact.progress import Progress
+from warp_contact.progress import Progress, announce
 from warp_contact.render import render
 from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.simulation import Simulation
@@ -41,6 +41,7 @@ def run(args) -> int:
     module = load_scene(args.scene)
     scene = build_scene(module, args.scene, settings(module.build, args.settings))
     n = args.frames or getattr(module, "FRAMES", 120)
+    announce("loading the kernels (the first run compiles them)", args.quiet)
     try:
         sim = Simulation(
             scene,

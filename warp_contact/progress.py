@@ -20,7 +20,7 @@ class Progress:
         self.n_frames = n_frames
         self.done = self.width = 0
         self.start = self.written = time.monotonic()
-        self._write(f"frame 0/{n_frames}  starting (kernels compile on their first use)")
+        self._write(f"frame 0/{n_frames}")
 
     def update(self, frame: int, seconds: float, n_contacts: int, overlap: float) -> None:
         """Count a finished frame.
@@ -65,6 +65,14 @@ class Progress:
             self.stream.write("\r" + text.ljust(self.width))
             self.stream.flush()
             self.width = len(text)
+
+
+def announce(text: str, quiet: bool = False, stream: TextIO | None = None) -> None:
+    """Write a line where ``Progress`` would: what a terminal is to show before the first frame."""
+    stream = sys.stderr if stream is None else stream
+    if not quiet and stream.isatty():
+        stream.write(text + "\n")
+        stream.flush()
 
 
 def clock(seconds: float) -> str:

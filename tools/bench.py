@@ -14,20 +14,25 @@ so that other processes on the machine hardly count; those of frames and starts 
     step.elastic_ms            a captured step without contact: damping, predict, drift
     step.operations_ms         sum of all operations, each without what its call costs
     step.overhead_us_per_launch  what the captured step takes beyond that, for each operation
+    step.overhead_us           the same for the step
+    step.of_bound              step.ms over 90 ns a tet, 150 ns a surface vertex, 1 us a contact
     STAGE.launches, .ms        of a stage: damping, predict (and drift), candidates,
                                vertex_contacts, edge_contacts, impulses, closure
+    STAGE.bytes                of the arrays given to its operations, those of a launch once: what
+                               moving each once would be; a list counts with all its room
     STAGE.share                of the sum of all operations
     STAGE.ns_per_tet, .ns_per_surface_vertex, .ns_per_contact
     STAGE.OPERATION.launches, .ms   of a kernel or memory operation; printed with --kernels
-    frames_per_second          of whole frames of 1/60 s, with the estimate of the step
+    frames_per_second          of whole frames of 1/60 s, with the choice of the step
+    frame.choice_of_step_share    of the time of these frames
     contacts                   at the end of a step
     array_bytes                in the Warp arrays of model, state and work; without the Bvhs
     peak_rss_bytes             largest resident size of the process
 
 ``launch_overhead_us`` is the overhead in the 95 vertices of squeezed_sphere, where it matters most.
 ``pile.slope`` and ``worlds.slope`` are the exponents p of step.ms ~ vertices^p. ``import_s`` is the
-import of the package, ``warm_start_s`` and ``cold_start_s`` run from the start of Python to the end
-of the first frame with the kernels compiled before and with an empty kernel cache.
+import of the package; ``warm_frame_s`` and ``cold_frame_s`` are the first frame after it, the scene
+included, with the kernels compiled before and with an empty kernel cache.
 """
 
 import argparse

@@ -2,6 +2,7 @@
 
 from statistics import median
 from time import perf_counter
+from unittest import mock
 
 import numpy as np
 import warp as wp
@@ -22,6 +23,7 @@ def figures(case: Case, frames: int | None, repeats: int, device: str | None) ->
         pass
     timing = measure(sim, repeats)
     model = sim.model
+    seconds, choice = frame_time(sim)
     return {
         "vertices": model.n_vert,
         "surface_vertices": model.n_surf,
@@ -31,7 +33,8 @@ def figures(case: Case, frames: int | None, repeats: int, device: str | None) ->
         "substeps": sim.substeps,
         "window_steps": timing.steps,
         **step_figures(timing, model),
-        "frames_per_second": 1.0 / frame_time(sim),
+        "frames_per_second": 1.0 / seconds,
+        "frame.choice_of_step_share": choice,
         "array_bytes": timing.bytes,
         "array_bytes_per_vertex": timing.bytes / model.n_vert,
         "peak_rss_bytes": peak(),
@@ -47,10 +50,14 @@ def step_figures(timing: Timing, model) -> dict[str, float]:
         "step.elastic_ms": timing.elastic_ms,
         "step.operations_ms": sum(timing.ms.values()),
         "step.overhead_us_per_launch": timing.overhead_us,
+        "step.overhead_us": timing.overhead_us * sum(timing.launches.values()),
+        "step.of_bound": 1e6 * timing.step_ms / bound(model, timing.contacts),
+        "step.bytes": sum(timing.given.values()),
     }
     for stage, ms in timing.ms.items():
         found[f"{stage}.launches"] = timing.launches[stage]
         found[f"{stage}.ms"] = ms
+        found[f"{stage}.bytes"] = timing.given[stage]
         found[f"{stage}.share"] = timing.shares[stage]
         found[f"{stage}.ns_per_tet"] = 1e6 * ms / model.n_tet
         found[f"{stage}.ns_per_surface_vertex"] = 1e6 * ms / model.n_surf
@@ -62,15 +69,28 @@ def step_figures(timing: Timing, model) -> dict[str, float]:
     return found
 
 
-def frame_time(sim: wc.Simulation) -> float:
-    """Time of a frame [s], the rests of it on the host included."""
-    times = []
-    for _ in range(SHOWN_FRAMES):
+def bound(model, contacts: float) -> float:
+    """What a step may take [ns], by the size of the scene; the contacts with all their sweeps."""
+    return 90.0 * model.n_tet + 150.0 * model.n_surf + 1000.0 * contacts
+
+
+def frame_time(sim: wc.Simulation) -> tuple[float, float]:
+    """Time of a frame [s], that on the host included, and the part that chooses the step."""
+    times, choice, rates = [], [0.0], sim._spectrum.rates
+
+    def timed(x: wp.array) -> tuple[float, float]:
         start = perf_counter()
-        sim.step_frame()
-        wp.synchronize_device(sim.device)
-        times.append(perf_counter() - start)
-    return median(times)
+        found = rates(x)
+        choice[0] += perf_counter() - start
+        return found
+
+    with mock.patch.object(sim._spectrum, "rates", timed):
+        for _ in range(SHOWN_FRAMES):
+            start = perf_counter()
+            sim.step_frame()
+            wp.synchronize_device(sim.device)
+            times.append(perf_counter() - start)
+    return median(times), choice[0] / sum(times)
 
 
 def log_slope(x, y) -> float:

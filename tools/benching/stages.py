@@ -11,6 +11,7 @@ from time import thread_time
 
 import warp as wp
 
+from benching.memory import held
 from warp_contact import candidates, impulse, solver
 
 STAGES = {  # the functions of a stage; the outermost call counts
@@ -47,12 +48,14 @@ class StageTimer:
     Attributes:
         operations: stage and operation of each, in order; a kernel goes by its name
         ms: the time of each
+        bytes: of the arrays that each was given, what several of them share once
     """
 
     def __init__(self, device: wp.Device):
         """``device`` is that of the step."""
         self.operations: list[tuple[str, str]] = []
         self.ms: list[float] = []
+        self.bytes: list[int] = []
         self._device = device
         self._stage: str | None = None
         self._inside = False
@@ -98,8 +101,9 @@ class StageTimer:
 
     def _launch(self, launch):
         def call(kernel, *args, **kwargs):
+            size = held((*kwargs.get("inputs", ()), *kwargs.get("outputs", ())))
             if not self._device.is_cpu:
-                self._enclose(kernel.key, lambda: launch(kernel, *args, **kwargs))
+                self._enclose(kernel.key, size, lambda: launch(kernel, *args, **kwargs))
                 return
             command = launch(kernel, *args, record_cmd=True, **kwargs)
             if command is None:  # no thread to run
@@ -109,7 +113,7 @@ class StageTimer:
             command.launch()
             empty = _ms(command.launch)
             command.params[0] = bounds
-            self._count(kernel.key, _ms(command.launch) - empty)
+            self._count(kernel.key, size, _ms(command.launch) - empty)
 
         return call
 
@@ -118,29 +122,31 @@ class StageTimer:
             if self._inside:  # one operation may be made of others
                 return function(*args, **kwargs)
             self._inside = True
+            size = held(args)
             try:
                 if self._device.is_cpu:
                     self._small[name]()
                     empty = _ms(self._small[name])
-                    self._count(name, _ms(lambda: function(*args, **kwargs)) - empty)
+                    self._count(name, size, _ms(lambda: function(*args, **kwargs)) - empty)
                 else:
-                    self._enclose(name, lambda: function(*args, **kwargs))
+                    self._enclose(name, size, lambda: function(*args, **kwargs))
             finally:
                 self._inside = False
 
         return call
 
-    def _count(self, operation: str, ms: float) -> None:
+    def _count(self, operation: str, size: int, ms: float) -> None:
         self.operations.append((self._stage or OTHER, operation))
+        self.bytes.append(size)
         self.ms.append(ms)
 
-    def _enclose(self, operation: str, function) -> None:
+    def _enclose(self, operation: str, size: int, function) -> None:
         begin, end = (wp.Event(self._device, enable_timing=True) for _ in range(2))
         wp.record_event(begin)
         function()
         wp.record_event(end)
         self._events.append((len(self.ms), begin, end))
-        self._count(operation, 0.0)
+        self._count(operation, size, 0.0)
 
 
 def _ms(function) -> float:

@@ -30,6 +30,7 @@ class Timing:
         contacts: at the end of a step, mean over the window
         launches: of each stage, mean over the window: kernels and memory operations
         ms: of each stage: sum of these operations
+        given: bytes of the arrays given to the operations of each stage, mean over the window
         kernels: (launches, ms) of each operation, as stage and name
         bytes: in the arrays of model, state and work
     """
@@ -40,6 +41,7 @@ class Timing:
     contacts: float
     launches: dict[str, float]
     ms: dict[str, float]
+    given: dict[str, float]
     kernels: dict[tuple[str, str], tuple[float, float]]
     bytes: int
 
@@ -84,7 +86,9 @@ def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
     for key, ms in zip(window.operations, spent, strict=True):
         kernels[key][0] += 1.0 / steps
         kernels[key][1] += ms / steps
-    launches, ms = defaultdict(float), defaultdict(float)
+    launches, ms, given = (defaultdict(float) for _ in range(3))
+    for (stage, _), size in zip(window.operations, window.sizes, strict=True):
+        given[stage] += size / steps
     for (stage, _), (n, time) in kernels.items():
         launches[stage] += n
         ms[stage] += time
@@ -96,6 +100,7 @@ def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
         contacts=mean(window.contacts),
         launches={stage: launches[stage] for stage in found},
         ms={stage: max(0.0, ms[stage]) for stage in found},
+        given={stage: given[stage] for stage in found},
         kernels={key: tuple(of) for key, of in kernels.items()},
         bytes=held(sim.model, sim.state, sim._work),
     )
@@ -122,6 +127,7 @@ class _Window:
         self._start = Snapshot(sim.state, sim._work)
         self.contacts: list[int] = []
         self.operations: list[tuple[str, str]] = []
+        self.sizes: list[int] = []
 
     def restore(self) -> None:
         self._start.restore()
@@ -156,5 +162,5 @@ class _Window:
             for _ in range(self._steps):
                 solver.step(*self._arguments)
                 self.contacts.append(int(self._work.contacts.n.numpy()[0]))
-        self.operations = timer.operations
+        self.operations, self.sizes = timer.operations, timer.bytes
         return timer.ms

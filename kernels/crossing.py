@@ -57,11 +57,14 @@ def find_crossings(
     # in, out
     wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no crossing
     # out
-    crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact, 0 already elsewhere
+    crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact, 0 elsewhere
     contact: wp.array[EdgeContact],  # (capacity,) which contact
 ):
-    """For each candidate."""
-    for c in range(wp.tid(), n_pair[0], threads):
+    """For each candidate, and for the room behind them."""
+    for c in range(wp.tid(), crossing.shape[0], threads):
+        crossing[c] = 0
+        if c >= n_pair[0]:
+            continue
         e = edges[pair[c][0]]
         i = e[0]
         j = e[1]

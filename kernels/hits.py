@@ -90,10 +90,13 @@ def find_hits(
     # in, out
     wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no hit
     # out
-    hit: wp.array[int],  # (capacity + 1,) 1 for a hit, 0 already for all others
+    hit: wp.array[int],  # (capacity + 1,) 1 for a hit, 0 for all others
 ):
-    """For each candidate."""
-    for c in range(wp.tid(), n_pair[0], threads):
+    """For each candidate, and for the room behind them."""
+    for c in range(wp.tid(), hit.shape[0], threads):
+        hit[c] = 0
+        if c >= n_pair[0]:
+            continue
         i = pair[c][0]
         body = pair[c][1]
         spent = way[vert_body[i]] + way[body]
@@ -126,8 +129,13 @@ def list_hits(
     hit_vert: wp.array[int],  # (contacts,)
     hit_body: wp.array[int],  # (contacts,) n_body + p for plane p
     hit_layer: wp.array[int],  # (contacts,) -1: no depth yet
+    layer: wp.array[int],  # (1,) 0
+    pending: wp.array[int],  # (1,) 0
 ):
-    """For each candidate."""
+    """For each candidate; the first thread sets what their depths begin with."""
+    if wp.tid() == 0:
+        layer[0] = 0
+        pending[0] = 0
     for c in range(wp.tid(), n_pair[0], threads):
         e = hit_at[c]
         if hit_at[c + 1] == e or e >= hit_vert.shape[0]:

@@ -31,10 +31,12 @@ def total_contacts(
     capacity: int,
     # out
     n_contact: wp.array[int],  # (1,)
+    n_touched: wp.array[int],  # (1,) 0: ``sort_entries`` counts them
     # out, added to
     needed: wp.array[int],  # largest number seen, to grow the capacity
 ):
     """One thread: the number of contacts."""
+    n_touched[0] = 0
     n = hits[0] + crossings[0]
     n_contact[0] = wp.min(n, capacity)
     if n > capacity:

@@ -10,8 +10,6 @@ from warp_contact.work import Work
 
 def hit_depths(model: Model, x: wp.array, work: Work) -> None:
     """Set ``hit_depth``, ``hit_dir`` and ``hit_layer``: the border, then layer by layer."""
-    work.layer.zero_()
-    work.pending.zero_()
     hits = [work.candidates.verts.start, work.hit_at, work.hit_vert, work.hit_body]
     launch_over(
         penetration.border_depth,
@@ -77,7 +75,6 @@ def contacts_by_vertex(model: Model, work: Work) -> None:
         inputs=[c.n, c.vert, c.coef],
         outputs=[c.start, c.entry],
     )
-    c.n_touched.zero_()
     outputs = [c.entry, c.touched, c.n_touched]
     launch_over(incidence.sort_entries, model.n_vert, inputs=[c.start], outputs=outputs)
 
@@ -92,5 +89,5 @@ def _count(work: Work, crossings: wp.array) -> None:
         incidence.total_contacts,
         dim=1,
         inputs=[work.n_hit, crossings, work.capacity.contacts],
-        outputs=[work.contacts.n, work.contacts.needed[0:1]],
+        outputs=[work.contacts.n, work.contacts.n_touched, work.contacts.needed[0:1]],
     )

@@ -10,10 +10,9 @@ from warp_contact.work import Work
 
 
 def find_hits(model: Model, x: wp.array, work: Work) -> None:
-    """Set the hits at ``x``, sorted by vertex and body, and ``hit_at``."""
+    """Set the hits at ``x``, sorted by vertex and body, ``hit_at``, ``layer`` and ``pending``."""
     candidates.track(model, x, work)
     c = work.candidates.verts
-    work.hit_at.zero_()
     launch_over(
         hits.find_hits,
         work.capacity.verts,
@@ -26,7 +25,7 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
         hits.list_hits,
         work.capacity.verts,
         inputs=[model.n_body, c.n, c.pair, work.hit_at],
-        outputs=[work.hit_vert, work.hit_body, work.hit_layer],
+        outputs=[work.hit_vert, work.hit_body, work.hit_layer, work.layer, work.pending],
     )
 
 
@@ -34,7 +33,6 @@ def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: b
     """Set ``crossing`` and ``crossing_at``: edges across a body at ``x`` in a step from ``x0``."""
     candidates.track(model, x, work)
     c = work.candidates.edges
-    work.crossing_at.zero_()
     launch_over(
         crossing.find_crossings,
         work.capacity.edges,

@@ -57,6 +57,8 @@ def _model(*bodies, fixed=(), gravity=(0.0, 0.0, 0.0)) -> SimpleNamespace:
     inv_mass = 1.0 / mass
     inv_mass[list(fixed)] = 0.0
     start = np.concatenate([[0], np.cumsum(np.bincount(tets.ravel()))])
+    pairs = [(i, j) for i in range(4) for j in range(4) if i != j]
+    ends = np.unique(tets[:, pairs].reshape(-1, 2), axis=0)
     elements, first = [], 0
     for vertices, t, material in bodies:
         elements.append(
@@ -83,6 +85,8 @@ def _model(*bodies, fixed=(), gravity=(0.0, 0.0, 0.0)) -> SimpleNamespace:
         volume=wp.array(volume, dtype=float),
         vt_start=wp.array(start, dtype=int),
         vt_corner=wp.array(np.argsort(tets.ravel(), kind="stable"), dtype=int),
+        vn_start=wp.array(np.searchsorted(ends[:, 0], np.arange(len(x) + 1)), dtype=int),
+        vn_vert=wp.array(ends[:, 1], dtype=int),
     )
 
 

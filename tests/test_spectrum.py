@@ -143,15 +143,29 @@ def test_positions_that_are_not_finite_give_infinity_and_leave_no_trace(blob, bu
     assert spectrum.omega(y) == Spectrum(model).omega(y)
 
 
-def test_rates_are_found_again_when_something_has_moved(blob, build_model):
+def test_rates_are_found_again_when_a_shape_that_matters_has_changed(blob, build_model):
     x, tets = blob((4, 3, 2))
-    model = build_model((x, tets, MATERIALS[0]), fixed=[0, 1, 2])
-    model.body_edge = wp.full(1, 1.0, dtype=float)
-    spectrum = Spectrum(model)
+    soft = NeoHookean(0.01 * MATERIALS[0].youngs_modulus, 0.3, 1000.0)
+    model = build_model((x, tets, MATERIALS[0]), (x, tets, soft), fixed=[0, 1, 2])
+    spectrum, n = Spectrum(model), len(x)
+    x = np.concatenate([x, x])
     rates = spectrum.rates(wp.array(x, dtype=wp.vec3))
     assert min(rates) >= 0.0 and rates[0] > 0.0
-    still = x + 0.9 * spectrum_file.CLOSE
-    assert spectrum.rates(wp.array(still, dtype=wp.vec3)) is rates
+
+    turned = x[:, [1, 2, 0]] + 5.0
+    little = turned.copy()
+    little[:n] *= 1.0 + 0.9 * spectrum_file.CLOSE / spectrum_file.STEEP
+    little[n:, 0] *= 1.3  # the soft body, whose rates are far from the largest
+    calls = []
+    bounds = spectrum._bounds
+    spectrum._bounds = lambda *args: calls.append(args) or bounds(*args)
+    assert spectrum.rates(wp.array(turned, dtype=wp.vec3)) == rates
+    assert spectrum.rates(wp.array(little, dtype=wp.vec3)) == rates
+    assert not calls
+    little[:n, 0] *= 1.0 + 0.2 * spectrum_file.CLOSE / spectrum_file.STEEP
+    spectrum.rates(wp.array(little, dtype=wp.vec3))
+    assert calls
+    spectrum._bounds = bounds
     squeezed = wp.array(x * [1.0, 1.0, 0.5], dtype=wp.vec3)
     assert spectrum.rates(squeezed)[0] == pytest.approx(Spectrum(model).omega(squeezed), rel=0.05)
     assert spectrum.rates(wp.full(len(x), np.nan, dtype=wp.vec3))[0] == np.inf

@@ -1,6 +1,5 @@
 """The fastest elastic mode and the fastest damping of a scene, for the choice of the step."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -17,7 +16,8 @@ FIRST, LATER = (3, 8), (1, 2)  # fewest and most restarts in the first call, in 
 NOISE = 0.1  # random part of a restart, so that a mode elsewhere can come up
 SECOND = 0.3  # part of the second mode in a restart, so that it can overtake
 TOLERANCE = 0.02  # gap between the estimate and its bound that ends the restarts, of lambda
-CLOSE = 2e-3  # of an edge: how far vertices may move before the rates are found again
+CLOSE = 0.02  # of the largest rates: how much a change of shape may add before they are found again
+STEEP = 3.0  # relative change of a frequency for one of an edge, that of its rate twice as much
 SEED = 20051125
 
 
@@ -52,16 +52,38 @@ class Spectrum:
         self._noise = wp.array(_unit(noise, model), dtype=wp.vec3)
         self._start: dict[Callable, wp.array] = {}
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
+        self._edges = _edges(model)
+        bodies = model.vert_body.numpy()[self._edges[:, 0]]
+        self._first = np.searchsorted(bodies, np.arange(model.n_body))
         self._at: np.ndarray | None = None
-        self._rates = 0.0, 0.0
+        self._of_bodies = np.zeros((2, model.n_body))
 
     def rates(self, x: wp.array) -> tuple[float, float]:
-        """``omega`` and ``damping_rate``, or those of the last call if ``x`` is still ``CLOSE``."""
-        at, edge = x.numpy(), self._model.body_edge.numpy().min()
-        if self._at is None or not np.abs(at - self._at).max() <= CLOSE * edge:
+        """``omega`` and ``damping_rate``, or those of a former call while shapes are ``CLOSE``.
+
+        Rigid motion changes no rate, and the shape of a body only matters as far as it could come
+        to have the largest one.
+        """
+        at = x.numpy()
+        if self._at is None or not self._close(at):
             self._at = at.copy()
-            self._rates = self.omega(x), self.damping_rate(x)
-        return self._rates
+            squares = self._bounds(forces.apply_stiffness, x)
+            self._of_bodies = np.array([squares**0.5, self._damping_rates(x)])
+        omega, rate = self._of_bodies.max(axis=1).tolist()
+        return omega, rate
+
+    def _close(self, at: np.ndarray) -> bool:
+        """Whether the rates of the bodies, by what their edges changed, are below the largest."""
+        before, now = (
+            np.linalg.norm(x[self._edges[:, 1]] - x[self._edges[:, 0]], axis=1)
+            for x in (self._at, at)
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = np.maximum.reduceat(np.abs(now / before - 1.0), self._first)
+        growth = (1.0 + STEEP * change) / (1.0 + CLOSE)
+        most = self._of_bodies.max(axis=1)
+        grown = self._of_bodies * [growth, growth**2]
+        return bool((grown.max(axis=1) <= most).all())
 
     def omega(self, x: wp.array) -> float:
         """Angular frequency [1/s] of the fastest mode at the positions ``x`` [m].
@@ -69,22 +91,17 @@ class Spectrum:
         Symplectic Euler is stable for steps below 2 / omega. K may be indefinite: the largest
         magnitude counts. 0 when no vertex is free, inf when ``x`` is not finite.
         """
-        return self._largest(forces.apply_stiffness, x) ** 0.5
+        return float(self._bounds(forces.apply_stiffness, x).max()) ** 0.5
 
     def damping_rate(self, x: wp.array) -> float:
         """Largest eigenvalue [1/s] of M^-1 C at the positions ``x`` [m]; 0 without damping."""
-        damped = [e.damped for e in self._model.elements]
-        if not any(damped):
-            return 0.0
-        if not all(damped):
-            self._f_tet.zero_()
-        return self._largest(forces.apply_damping, x)
+        return float(self._damping_rates(x).max())
 
     def starts(self) -> dict[str, np.ndarray]:
         """What the next calls start from."""
         starts = {apply.__name__: start.numpy() for apply, start in self._start.items()}
         if self._at is not None:
-            starts |= {"at": self._at, "rates": np.array(self._rates)}
+            starts |= {"at": self._at, "of_bodies": self._of_bodies}
         return starts
 
     def start_from(self, starts: dict[str, np.ndarray]) -> None:
@@ -96,9 +113,19 @@ class Spectrum:
             if apply.__name__ in starts
         }
         self._at = starts.get("at")
-        self._rates = tuple(map(float, starts.get("rates", (0.0, 0.0))))
+        self._of_bodies = starts.get("of_bodies", self._of_bodies)
 
-    def _largest(self, apply: Callable, x: wp.array) -> float:
+    def _damping_rates(self, x: wp.array) -> np.ndarray:
+        """Bounds on the eigenvalues [1/s] of M^-1 C of each body, shape (n_body,)."""
+        damped = [e.damped for e in self._model.elements]
+        if not any(damped):
+            return np.zeros(self._model.n_body)
+        if not all(damped):
+            self._f_tet.zero_()
+        return self._bounds(forces.apply_damping, x)
+
+    def _bounds(self, apply: Callable, x: wp.array) -> np.ndarray:
+        """Bounds on the eigenvalues of each body, shape (n_body,)."""
         wp.copy(self._x, x)
         first = apply not in self._start
         if first:
@@ -106,17 +133,17 @@ class Spectrum:
         wp.copy(self._basis[0], self._start[apply])
         fewest, most = FIRST if first else LATER
         depth = DEPTH if first else SHORT
-        bound = 0.0
+        bound = np.zeros(self._model.n_body)
         for cycle in range(most):
             self._cycle(apply, depth)
             coef = self._coef.numpy()[: 2 * depth + 1]
             if not np.isfinite(coef).all():
                 del self._start[apply]
-                return math.inf
+                return np.full(self._model.n_body, np.inf)
             theta, residual, ritz = _ritz_pairs(coef)
             self._restart(ritz)
-            bound = float(np.max(theta + residual))
-            if cycle + 1 >= fewest and bound <= (1.0 + TOLERANCE) * float(np.max(theta)):
+            bound = theta + residual
+            if cycle + 1 >= fewest and bound.max() <= (1.0 + TOLERANCE) * theta.max():
                 break
         wp.copy(self._start[apply], self._basis[0])
         return bound
@@ -165,6 +192,13 @@ class Spectrum:
     def _add_up(self, row: int) -> None:
         inputs = [self._body_chunk, self._part, row]
         wp.launch(lanczos.add_up, dim=self._model.n_body, inputs=inputs, outputs=[self._coef])
+
+
+def _edges(model: Model) -> np.ndarray:
+    """Vertices of every tet edge, shape (n, 2)."""
+    start, second = model.vn_start.numpy(), model.vn_vert.numpy()
+    first = np.repeat(np.arange(model.n_vert, dtype=np.int32), np.diff(start))
+    return np.stack([first, second], axis=1)[first < second]
 
 
 def _chunks(body_vert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -62,7 +62,7 @@ def step(
         impulse.record_vertices(work, unit)
         drift(model, state, work, state.x)
         # The impulses moved what was looked at.
-        wp.capture_if(work.n_crossing if search else work.found[2:3], look_again)
+        wp.capture_if(work.n_crossing if search else work.found[0:1], look_again)
         move_surfaces(model, state, work, response, search)  # what the step did not create
 
     def fly() -> None:

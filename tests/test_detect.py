@@ -108,8 +108,8 @@ def test_points_on_faces_edges_and_corners_are_inside_once(stages):
 def test_bodies_of_different_worlds_are_never_near(stages, jittered):
     scene = Scene()
     mesh = jittered(1.0, 2)
-    for world in (0, 1, 1, 2):
-        scene.add_body(mesh, RUBBER, (0.1 * world, 0.0, 0.0), world=world)
+    for k, world in enumerate((0, 1, 1, 2)):
+        scene.add_body(mesh, RUBBER, (0.1 * k, 0.0, 0.0), world=world)
     model, state, work = stages(scene)
     candidates.refresh(model, state.x, state.x, work)
     np.testing.assert_array_equal(work.near.n_near.numpy(), [0, 1, 1, 0])

@@ -18,13 +18,23 @@ def polar(f: np.ndarray) -> np.ndarray:
     return u @ vt
 
 
+def barrier(j: np.ndarray) -> np.ndarray:
+    """What keeps J above 0: a logarithm from 1/4 on, a parabola from 1/20 on."""
+    c, j0 = np.clip(j, 0.05, 0.25), 0.25
+    d, log = c - j0, np.log(c / j0)
+    slope = -5.0 * (2.0 * d * log + d * d / c)
+    bend = -5.0 * (2.0 * log + 4.0 * d / c - (d / c) ** 2)
+    e = np.minimum(j - c, 0.0)
+    return -5.0 * d * d * log + e * slope + e * e * bend / 2.0
+
+
 def density(material, f: np.ndarray) -> np.ndarray:
     """Energy density [Pa] straight from the formula, in float64."""
     mu, lam = material.lame()
     j = np.linalg.det(f)
     if isinstance(material, NeoHookean):
         shear = mu / 2.0 * ((f * f).sum((-1, -2)) - 3.0) - mu * (j - 1.0)
-        return shear + (lam + mu) / 2.0 * (j - 1.0) ** 2
+        return shear + (lam + mu) * ((j - 1.0) ** 2 / 2.0 + barrier(j))
     return mu * ((f - polar(f)) ** 2).sum((-1, -2)) + lam / 2.0 * (j - 1.0) ** 2
 
 
@@ -50,7 +60,10 @@ def turn(rng) -> np.ndarray:
 
 def deformed(x: np.ndarray, how: str, rng) -> np.ndarray:
     noise = 0.05 * rng.standard_normal(x.shape)
-    stretch = {"strained": [1.1, 0.9, 1.05], "inverted": [1.2, 0.8, -0.5]}[how]
+    stretch = {"strained": [1.1, 0.9, 1.05], "inverted": [1.2, 0.8, -0.5]}
+    stretch["flat"] = [1.2, 0.8, 0.14]
+    noise = noise if how != "flat" else 0.1 * noise
+    stretch = stretch[how]
     return ((x * stretch + noise) @ turn(rng).T).astype(np.float32).astype(float)
 
 
@@ -62,7 +75,7 @@ def block(box, build_model, rng):
     return x, lambda material: build_model((x, tets, material))
 
 
-@pytest.mark.parametrize("how", ["strained", "inverted"])
+@pytest.mark.parametrize("how", ["strained", "flat", "inverted"])
 @pytest.mark.parametrize("kind", MODELS)
 def test_forces_are_minus_the_energy_slope(kind, how, block, rng, forces_of):
     material = kind(E, NU, RHO)
@@ -70,10 +83,11 @@ def test_forces_are_minus_the_energy_slope(kind, how, block, rng, forces_of):
     x = deformed(block[0], how, rng)
     expected = -slope(lambda y: energy(material, model, y), x, 1e-5)
     # F is off by a few roundings, which the moduli turn into forces on faces of about 1 m^2.
-    np.testing.assert_allclose(forces_of(model, x), expected, atol=100.0 * EPS * E)
+    largest = max(E, np.abs(expected).max())
+    np.testing.assert_allclose(forces_of(model, x), expected, atol=100.0 * EPS * largest)
 
 
-@pytest.mark.parametrize("how", ["strained", "inverted"])
+@pytest.mark.parametrize("how", ["strained", "flat", "inverted"])
 @pytest.mark.parametrize("kind", MODELS)
 def test_stiffness_is_minus_the_force_differential(kind, how, block, rng, at_vertices):
     material = kind(E, NU, RHO)
@@ -173,7 +187,7 @@ def test_an_inverted_tet_pushes_back(kind, build_model, forces_of):
 def test_a_degenerate_tet_has_finite_forces(kind, shape, block, forces_of, at_vertices, rng):
     model = block[1](kind(E, NU, RHO))
     x = block[0] * shape
-    assert np.abs(forces_of(model, x)).max() < 10.0 * E
+    assert np.abs(forces_of(model, x)).max() < 1000.0 * E
     dx = rng.standard_normal(x.shape)
     # R has no differential where two singular values cancel: finite is all that is asked.
     assert np.isfinite(at_vertices(forces.apply_stiffness, model, x, dx)).all()

@@ -1,5 +1,6 @@
 """tools/stability.py: cells within the frontier, and that every kind of failure is seen as one."""
 
+import re
 import sys
 from functools import partial
 from pathlib import Path
@@ -165,13 +166,25 @@ def test_a_figure_that_is_no_number_is_never_fine(figure):
     assert classify(Record(**{figure: np.nan})) != outcome.FINE
 
 
-def test_a_step_that_is_too_long_fails():
-    r = attempt(partial(sweeps.SWEEPS["step"].build, 1e-2, 1e6))
-    assert classify(r) in (outcome.INFINITE, outcome.INVERTED, outcome.ENERGY, outcome.LOST)
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (partial(sweeps.SWEEPS["step"].build, 1e-2, 1e6), "substeps=1 is too few: .* is unstable"),
+        (partial(speed.through, 0.9, 1), "substeps=1 is too few: bodies move 0.0018 m"),
+        (partial(degenerate.pair, gap=-degenerate.EDGE), "'low' and .* 'high' are in exactly the"),
+        (partial(degenerate.pair, far=1e4), "body 'low' is 1e.04 m from the origin: beyond 1956 m"),
+        (partial(degenerate.sliver, 1e6), "body 'body0', tet 0 is too flat"),
+    ],
+)
+def test_what_is_beyond_the_method_is_refused_before_the_first_step(build, message):
+    r = attempt(build)
+    assert r.steps == 0 and re.search(message, r.reason)
+    assert level(r, outcome.BEYOND) == outcome.GOOD
+    assert level(r) == level(Record(), outcome.BEYOND) == outcome.MISSED
 
 
-def test_a_step_longer_than_both_bodies_goes_through():
-    r = attempt(partial(speed.through, 20.0, 1))
+def test_a_penalty_that_is_too_weak_lets_a_fast_block_through():
+    r = attempt(partial(speed.through, 20.0, None), METHODS[2])
     assert classify(r) == outcome.LOST
 
 

@@ -63,3 +63,12 @@ def test_a_frame_keeps_its_stages_until_the_margin_of_the_damping_is_used_up():
     assert substeps.stays_damped(dt, 0.999 * rate, 0.999 * MARGIN * rate)
     assert not substeps.stays_damped(dt, 0.999 * rate, 1.001 * MARGIN * rate)
     assert substeps.stays_damped(dt, 0.0, 0.0)
+
+
+def test_a_step_that_the_user_chose_is_refused_where_it_is_unstable_or_jumps_through():
+    def fault(dt, speed):
+        return substeps.fault(dt, OMEGA, speed, THICKNESS)
+
+    stable, still, fast = 2.0 / OMEGA, 0.0, substeps.LEAP * THICKNESS * OMEGA
+    assert "unstable" in fault(1.01 * stable, still) and not fault(0.99 * stable, still)
+    assert "thinnest body" in fault(1.01 / OMEGA, fast) and not fault(0.99 / OMEGA, fast)

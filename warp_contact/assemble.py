@@ -3,6 +3,7 @@
 import numpy as np
 import warp as wp
 
+from warp_contact import placement
 from warp_contact.scene import Scene
 from warp_contact.types import Elements, Model, State
 
@@ -11,11 +12,12 @@ def assemble(scene: Scene) -> tuple[Model, State]:
     """Lay the bodies of a scene out one behind the other, on the current device.
 
     Raises:
-        ValueError: the scene has no body
+        ValueError: the scene has no body, or bodies where none can be, see ``placement``
     """
     bodies = scene.bodies
     if not bodies:
         raise ValueError("the scene has no body")
+    placement.check(bodies)
     meshes = [body.mesh for body in bodies]
     vert0 = _prefix(len(mesh.vertices) for mesh in meshes)
     tet0 = _prefix(len(mesh.tets) for mesh in meshes)

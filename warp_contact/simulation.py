@@ -22,6 +22,7 @@ from warp_contact.rest import Rest, keep_forces
 from warp_contact.scene import Body, Scene
 from warp_contact.spectrum import Spectrum
 from warp_contact.substeps import (
+    fault,
     raised,
     stays_damped,
     stays_stable,
@@ -146,6 +147,7 @@ class Simulation:
             while self._search is None or self._grow():
                 self._search = solver.overlaps(self.model, self.state, self._work)
             omega, rate = self._rates or self._spectrum.rates(self.state.x)
+            self._check_wanted(omega)
             last, halved = self.substeps, 0
             for _attempt in range(ATTEMPTS):
                 dt = self._run(omega, rate, last)
@@ -303,10 +305,24 @@ class Simulation:
         if not math.isfinite(omega):
             tet = flattest_tet(self.model, self.state.x)
             raise SimulationError(f"frame {self.frame + 1}: {tet} is too flat: no step is stable")
+        return steps_per_second(omega, self._speed(), self._thickness, self._edge)
+
+    def _speed(self) -> float:
+        """Largest relative speed in the frame to come [m/s]."""
         v = self.state.v.numpy()
         speed = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0)))
-        speed += float(np.linalg.norm(self.model.gravity)) / self.fps
-        return steps_per_second(omega, speed, self._thickness, self._edge)
+        return speed + float(np.linalg.norm(self.model.gravity)) / self.fps
+
+    def _check_wanted(self, omega: float) -> None:
+        """Refuse steps that the user chose too long at the frequency ``omega`` [1/s]."""
+        if self._wanted is None:
+            return
+        speed = 0.0 if self.frame else self._speed()
+        wrong = fault(1.0 / (self.fps * self._wanted), omega, speed, self._thickness)
+        if wrong:
+            raise SimulationError(
+                f"frame {self.frame + 1}: substeps={self._wanted} is too few: {wrong}"
+            )
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured steps of a frame, with so many stages of damping."""

@@ -20,7 +20,7 @@ class Case:
     Attributes:
         name: number in the specification and a few words
         build: its setting; raises ValueError where the input is refused
-        expect: ``fine`` or ``refused``
+        expect: ``fine``, ``refused``, or ``beyond`` for what is refused though it has a meaning
         limit: seconds that it may take
     """
 

@@ -7,7 +7,7 @@ import numpy as np
 
 import warp_contact as wc
 from stable.case import DOWN, NONE, UP, Case, soft
-from stable.outcome import REFUSED
+from stable.outcome import BEYOND, FINE, REFUSED
 from stable.pieces import UPSIDE_DOWN, tip
 from stable.watch import Setting
 
@@ -23,12 +23,13 @@ def cases(quick: bool) -> Iterator[Case]:
     yield Case("B11 vertex exactly on a face", partial(on_tip, 0.0, 0.0))
     yield Case("B11 vertex exactly on an edge", partial(on_tip, 0.25 * EDGE, 0.0))
     yield Case("B11 vertex exactly on a vertex", partial(on_tip, 0.0, 0.0, 2))
-    yield Case("B11 equal bodies in one place", partial(pair, gap=-EDGE, recovers=True))
-    for aspect in (1e3, 1e6):
-        yield Case(f"B11 sliver tet of aspect {aspect:g}", partial(sliver, aspect))
+    yield Case("B11 equal bodies in one place", partial(pair, gap=-EDGE), BEYOND)
+    yield Case("B11 sliver tet of aspect 1000", partial(sliver, 1e3))
+    yield Case("B11 sliver tet of aspect 1e+06", partial(sliver, 1e6), BEYOND)
     yield Case("B11 inverted tets at the start", pulled_through)
     for far in (1e1, 1e2, 1e3) if quick else (1e1, 1e2, 1e3, 1e5, 1e7):
-        yield Case(f"B11 {far:g} m from the origin", partial(pair, far=far))
+        expect = FINE if far < 2e3 else BEYOND
+        yield Case(f"B11 {far:g} m from the origin", partial(pair, far=far), expect)
     for scale in (1e-3, 1.0, 1e3):
         yield Case(f"B11 lengths times {scale:g}", partial(pair, scale=scale))
     for young in (1e2, 1e6, 1e9) if quick else (1e2, 1e6, 1e9, 1e12):

@@ -154,7 +154,10 @@ def run(setting: Setting, response, most_steps: int = 10**9, limit: float = 120.
                 if not r.finite or r.lost or r.gained > RUNAWAY or r.steps >= most_steps:
                     break
     except wc.SimulationError as error:
-        r.error, r.finite = str(error), "finite" not in str(error)
+        if sim.substeps == 0:
+            r.refused = str(error)
+        else:
+            r.error, r.finite = str(error), "finite" not in str(error)
     except TimeoutError:
         r.error = f"frame {sim.frame + 1}: not done after {limit:g} s"
     except Exception as error:  # no run should end like this: it is an outcome, with its kind

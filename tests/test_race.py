@@ -54,6 +54,7 @@ def test_a_run_without_a_motion_gives_its_reason_and_time():
 def test_every_scene_of_the_race_can_be_built():
     import race
 
-    for build, seconds in race.RACES.values():
+    for build, seconds, settings in race.RACES.values():
         assert len(build().bodies) > 1
         assert seconds > 0.0
+        assert all(len(values) >= settings > 0 for values in race.SETTINGS.values())

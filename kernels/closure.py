@@ -30,7 +30,6 @@ def leftover(
     # in
     threads: int,
     tolerance: float,  # of an edge; less is not worth a move
-    far: float,  # of an edge; to close less is not worth another look
     deep: float,  # of an edge; less at the start of the step is not worth a search
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
@@ -45,7 +44,7 @@ def leftover(
     # out
     left: wp.array[float],  # (capacity,) [m], 0 up to the tolerance
     # out, added to
-    found: wp.array[int],  # (3,) 1 when any overlap is to be closed, to be searched, is far
+    found: wp.array[int],  # (2,) 1 when any overlap is to be closed, and to be searched
     deep_found: wp.array[int],  # (1,) 1 when any has been to be searched since the frame began
 ):
     """For each contact: the overlap at x."""
@@ -58,8 +57,6 @@ def leftover(
         if d > tolerance * edge:
             left[c] = d
             found[0] = 1
-        if d > far * edge:
-            found[2] = 1
         if d > deep * edge and -closing[c] * dt[0] > deep * edge:
             found[1] = 1
             deep_found[0] = 1

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 from benching.cases import copies, pile
 from benching.memory import held
 from benching.stages import MEMORY, OTHER, STAGES, StageTimer
-from benching.window import measure
+from benching.window import Timing, measure
 
 
 @pytest.fixture
@@ -36,9 +36,16 @@ def test_every_launch_belongs_to_a_stage(touching):
     assert sum(timing.launches.values()) == pytest.approx(
         sum(launches for launches, _ in timing.kernels.values())
     )
-    assert sum(timing.shares.values()) == pytest.approx(1.0)
+    assert all(size > 0 for size in timing.given.values())
     assert timing.step_ms > 0.0
     assert timing.elastic_ms > 0.0
+
+
+def test_shares_are_those_of_the_time_and_none_without_any():
+    none = dict(steps=1, step_ms=0.0, elastic_ms=0.0, contacts=0.0, launches={}, given={})
+    none |= dict(kernels={}, bytes=0)
+    assert Timing(ms={"a": 3.0, "b": 1.0}, **none).shares == {"a": 0.75, "b": 0.25}
+    assert Timing(ms={"a": 0.0, "b": 0.0}, **none).shares == {"a": 0.0, "b": 0.0}
 
 
 def test_a_launch_outside_of_a_step_is_seen_as_such(device):

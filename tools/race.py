@@ -6,7 +6,6 @@ Every engine gets the same vertices, tets, masses and damping and is judged from
 in ``tools/pareto.py``; each runs once, so that no time is better than the machine is quiet. Nothing
 is swept: the settings are a fast and a plain one of each engine, in large scenes the fast one.
 
-
     s / s       wall seconds per simulated second, compiling and the first frame left out
     overlap     deepest one after any frame, in edges of the finer body
     at the end  the same after the last frame

@@ -11,7 +11,7 @@ from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.types import Model, State
 from warp_contact.work import Work
 
-LOOKS = 3  # after a closure over some way, at the vertices and edges again, and another closure
+LOOKS = 3  # after the closure, at the vertices and edges again, each followed by another closure
 
 
 def step(
@@ -200,18 +200,14 @@ def move_surfaces(
 
     def close(looks: int = LOOKS) -> None:
         surface.close(model, state.x, state.v, work, search)
-
-        def look() -> None:
-            # Where vertices came to lie, their triangles may be others than those of stage 2, and
-            # edges may cross that it could not see.
-            if looks == LOOKS:
-                vertex_contacts(model, state.x, state.x, work, not search)
+        # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
+        # may cross that it could not see.
+        if looks == LOOKS:
+            vertex_contacts(model, state.x, state.x, work, not search)
+        if looks > 0:
             edge_contacts(model, state.x, state.x, work, not search)
             surface.leftover(model, state.x, work)
             wp.capture_if(work.found[0:1], partial(close, looks - 1))
-
-        if looks > 0:
-            wp.capture_if(work.found[2:3], look)
 
     def resolve() -> None:
         if search:

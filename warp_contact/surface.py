@@ -13,7 +13,6 @@ from warp_contact.types import Contacts, Model
 from warp_contact.work import Work
 
 TOLERANCE = 1e-4  # of an edge: less overlap is left to the resting gap of the impulses
-FAR = 2.5e-4  # of an edge: who moves less to close an overlap meets nobody else on the way
 DEEP = 1e-3  # of an edge: an overlap at the start of the step, worth a search
 BOUND = 0.02  # of an edge: the largest move in a step; more would invert a body started deep inside
 PASSES = 32  # of the closure, at most
@@ -26,7 +25,7 @@ def leftover(model: Model, x: wp.array, work: Work) -> None:
     launch_over(
         closure.leftover,
         work.capacity.contacts,
-        inputs=[TOLERANCE, FAR, DEEP, c.n, c.vert, c.coef, c.normal, c.offset, c.pair]
+        inputs=[TOLERANCE, DEEP, c.n, c.vert, c.coef, c.normal, c.offset, c.pair]
         + [model.body_edge, c.closing, work.dt, x],
         outputs=[c.left, work.found, work.deep_found],
     )

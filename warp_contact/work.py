@@ -43,8 +43,7 @@ class Work:
         n_hit, n_crossing: views of the last entries of ``hit_at`` and ``crossing_at``
         done: sweeps over the contacts so far, shape (1,)
         again: whether another is needed, shape (1,)
-        found: whether anything is to be closed, to be searched, and to be closed over such a way
-            that another look has to follow, shape (3,)
+        found: whether any overlap is to be closed, and to be searched, shape (2,)
         deep_found: whether it had anything to search since the frame began, shape (1,)
         s: displacement vectors [m], shape (n_vert,)
         area: areas of comparison [m^2], shape (n_vert,)
@@ -170,7 +169,7 @@ def allocate_work(
         n_crossing=crossing_at[capacity.edges :],
         done=_ints(1),
         again=_ints(1),
-        found=_ints(3),
+        found=_ints(2),
         deep_found=_ints(1),
         s=_vectors(n),
         area=_floats(n),

@@ -48,7 +48,7 @@ class Timing:
     @property
     def shares(self) -> dict[str, float]:
         """Part of each stage in the sum of all."""
-        total = sum(self.ms.values())
+        total = sum(self.ms.values()) or 1.0  # a clock may be too coarse for all of them
         return {stage: ms / total for stage, ms in self.ms.items()}
 
     @property

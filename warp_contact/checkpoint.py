@@ -9,7 +9,7 @@ import numpy as np
 
 from warp_contact.types import Model
 
-FORMAT = 1
+FORMAT = 2
 
 
 def fingerprint(model: Model, *settings) -> str:

@@ -7,8 +7,8 @@
     b   = -5 (J - J0)^2 ln(J / J0)  for J < J0 = 1/4, its tangent parabola below 1/20, else 0
 
 I_C = F : F, J = det F; mu, lam are the Lame parameters of small strain [Pa], beta the damping
-time [s] of the viscous stress in ``tet.viscous_stress``. P is a polynomial in F: it is finite
-and pushes back for flat and inverted tets.
+time [s] of the viscous stress in ``tet.viscous_stress``. P is a polynomial in F, but for the
+logarithm between 1/20 and 1/4: it is finite and pushes back for flat and inverted tets.
 
 Without b (not in the source) a column whose sides are free carries at most 0.23, 0.81 or 2.2 E
 along its axis, for a ratio of 0, 0.3 or 0.4; what presses harder turns it inside out, however short

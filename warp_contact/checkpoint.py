@@ -50,7 +50,8 @@ def read(path: str | os.PathLike, scene: str) -> dict[str, np.ndarray]:
     except (ValueError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path} is no checkpoint") from error
     if str(values.pop("scene", "")) != scene:
-        raise ValueError(f"{path} is of another scene, or of other settings of the simulation")
+        what = "another scene, or of other settings or another version of the simulation"
+        raise ValueError(f"{path} is of {what}")
     return values
 
 

@@ -9,7 +9,10 @@ from warp_contact.work import Work
 
 
 def hit_depths(model: Model, x: wp.array, work: Work) -> None:
-    """Set ``hit_depth``, ``hit_dir`` and ``hit_layer``: the border, then layer by layer."""
+    """Set ``hit_depth``, ``hit_dir`` and ``hit_layer``: the border, then layer by layer.
+
+    Once after each ``detect.find_hits``, which sets ``layer`` and ``pending``.
+    """
     hits = [work.candidates.verts.start, work.hit_at, work.hit_vert, work.hit_body]
     launch_over(
         penetration.border_depth,
@@ -63,7 +66,7 @@ def edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
 
 
 def contacts_by_vertex(model: Model, work: Work) -> None:
-    """Set ``contacts.start``, ``entry`` and ``touched``."""
+    """Set ``contacts.start``, ``entry`` and ``touched``, once after contacts were counted."""
     c = work.contacts
     m = work.capacity.contacts
     c.start.zero_()

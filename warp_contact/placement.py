@@ -14,8 +14,8 @@ def check(bodies: list) -> None:
 
     Raises:
         ValueError: naming a body that is so far from the origin that rounding moves it by
-            ``DROWNED`` gaps at rest, or two of one world that fill the same space: neither is
-            inside the other, and no direction leads out
+            ``DROWNED`` gaps at rest, or two of one world, not both fixed, that fill the same space:
+            neither is inside the other, and no direction leads out
     """
     edges = [_mean_edge(body) for body in bodies]
     for body, edge in zip(bodies, edges, strict=True):
@@ -28,6 +28,7 @@ def check(bodies: list) -> None:
     shape = np.array([_shape(body) for body in bodies])
     slack = SAME * np.array(edges)
     world = np.array([body.world for body in bodies])
+    held = np.array([bool(np.all(body.fixed)) for body in bodies])
     mix = np.sqrt(np.arange(2.0, 2.0 + shape.shape[1]))
     along, reach = shape @ mix, slack.max() * mix.sum()  # like shapes are near each other along it
     order = np.lexsort((along, world))
@@ -37,6 +38,7 @@ def check(bodies: list) -> None:
         if not near.any():
             return
         same = near & (np.abs(shape[p] - shape[q]).max(axis=1) <= np.minimum(slack[p], slack[q]))
+        same &= ~(held[p] & held[q])
         if same.any():
             a, b = sorted((int(p[same.argmax()]), int(q[same.argmax()])))
             raise ValueError(

@@ -17,6 +17,7 @@ from warp_contact.kernels import (
     pair_impulses,
     pairs,
     penetration,
+    shape,
     vertex_contact,
     warm,
 )
@@ -25,7 +26,7 @@ from warp_contact.types import Model
 # What a frame of any scene uses. The search for overlaps at the start, other responses, sleep and
 # measuring are left out: many scenes do without.
 ALWAYS = (bounds, candidates, closure, crossing, hashing, hits, impulse, incidence, lanczos, motion)
-ALWAYS += (near, pair_impulses, pairs, penetration, vertex_contact, warm)
+ALWAYS += (near, pair_impulses, pairs, penetration, shape, vertex_contact, warm)
 
 
 def load_kernels(model: Model, device: wp.Device) -> None:

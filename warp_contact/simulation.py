@@ -102,6 +102,8 @@ class Simulation:
         self._unit = UNIT * (mobile if mobile > 0.0 else 1.0)
         self._thickness = float(self.model.body_thickness.numpy().min())
         self._edge = float(self.model.body_edge.numpy().min())
+        of_bodies = np.unique(self.model.body_world.numpy(), return_inverse=True)[1]
+        self._world = of_bodies[self.model.vert_body.numpy()]
         self._largest_inv_mass = float(inv_mass.max())
         self._graphs: dict[tuple[int, bool], wp.Graph] = {}
         self._search: bool | None = None  # whether some overlap was not created by a step
@@ -300,17 +302,25 @@ class Simulation:
 
     def _steps_per_second(self, omega: float) -> float:
         """Steps [1/s] at the frequency [1/s] and the state given, see ``substeps``."""
-        if isinstance(self.response, Penalty):
-            omega = with_penalty(omega, self.response.stiffness, self._largest_inv_mass)
         if not math.isfinite(omega):
             tet = flattest_tet(self.model, self.state.x)
             raise SimulationError(f"frame {self.frame + 1}: {tet} is too flat: no step is stable")
+        omega = self._with_response(omega)
         return steps_per_second(omega, self._speed(), self._thickness, self._edge)
 
+    def _with_response(self, omega: float) -> float:
+        """The frequency [1/s] of the elastic forces, or that of a penalty with them."""
+        if isinstance(self.response, Penalty):
+            return with_penalty(omega, self.response.stiffness, self._largest_inv_mass)
+        return omega
+
     def _speed(self) -> float:
-        """Largest relative speed in the frame to come [m/s]."""
+        """Largest relative speed within a world in the frame to come [m/s]."""
         v = self.state.v.numpy()
-        speed = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0)))
+        most, least = np.full((2, self._world.max() + 1, 3), -np.inf)
+        np.maximum.at(most, self._world, v)
+        np.maximum.at(least, self._world, -v)
+        speed = float(np.linalg.norm(most + least, axis=1).max())
         return speed + float(np.linalg.norm(self.model.gravity)) / self.fps
 
     def _check_wanted(self, omega: float) -> None:
@@ -318,7 +328,8 @@ class Simulation:
         if self._wanted is None:
             return
         speed = 0.0 if self.frame else self._speed()
-        wrong = fault(1.0 / (self.fps * self._wanted), omega, speed, self._thickness)
+        dt = 1.0 / (self.fps * self._wanted)
+        wrong = fault(dt, self._with_response(omega), speed, self._thickness)
         if wrong:
             raise SimulationError(
                 f"frame {self.frame + 1}: substeps={self._wanted} is too few: {wrong}"

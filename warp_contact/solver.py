@@ -11,7 +11,7 @@ from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.types import Model, State
 from warp_contact.work import Work
 
-LOOKS = 3  # after the closure, at the vertices and edges again, each followed by another closure
+LOOKS = 3  # after the closure at the edges again, first at the vertices too; a closure after each
 
 
 def step(
@@ -157,9 +157,9 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
 
     def find() -> None:
         detect.find_hits(model, x, work)
-        wp.capture_if(work.n_hit, record, work.contacts.n.zero_)
+        wp.capture_if(work.n_hit, make_contacts, work.contacts.n.zero_)
 
-    def record() -> None:
+    def make_contacts() -> None:
         depth.hit_depths(model, x, work)
         depth.vertex_contacts(model, x0, x, work, fresh)
         depth.contacts_by_vertex(model, work)

@@ -6,7 +6,7 @@ import numpy as np
 import warp as wp
 
 from warp_contact import forces
-from warp_contact.kernels import lanczos
+from warp_contact.kernels import lanczos, shape
 from warp_contact.types import Model
 
 DEPTH = 8  # Lanczos steps of a restart in the first call
@@ -16,8 +16,9 @@ FIRST, LATER = (3, 8), (1, 2)  # fewest and most restarts in the first call, in 
 NOISE = 0.1  # random part of a restart, so that a mode elsewhere can come up
 SECOND = 0.3  # part of the second mode in a restart, so that it can overtake
 TOLERANCE = 0.02  # gap between the estimate and its bound that ends the restarts, of lambda
-CLOSE = 0.02  # of the largest rates: how much a change of shape may add before they are found again
-STEEP = 3.0  # relative change of a frequency for one of an edge, that of its rate twice as much
+LITTLE = 0.01  # change of shape, see kernels/shape.py, that moves a rate by some percent at most
+MUCH = 0.2  # change that makes a frequency at most SLOWER times as large, a damping its square
+SLOWER = 4.0
 SEED = 20051125
 
 
@@ -30,14 +31,14 @@ class Spectrum:
     it bounds the spectrum (Zhou, Saad, Tiago, Chelikowsky 2006, "Self-consistent-field
     calculations using Chebyshev-filtered subspace iteration"). On random meshes of
     up to 200 vertices omega came out 0 to 1.2 % too high; right after a sudden change of shape it
-    can be some percent too low for a frame.
+    can be some percent too low for a frame. ``rates`` are found again where shapes have changed.
 
     Later calls start from the last result and need ``SHORT`` products with K, or twice as many.
     Deterministic: the first start vector is a fixed random one. Reads back once per restart.
     """
 
     def __init__(self, model: Model) -> None:
-        """Allocate about 160 bytes per vertex and 48 per tet on the current device."""
+        """Allocate about 160 bytes per vertex and 84 per tet on the current device."""
         self._model = model
         chunk, body_chunk = _chunks(model.body_vert.numpy())
         self._chunk = wp.array(chunk, dtype=int)
@@ -52,38 +53,40 @@ class Spectrum:
         self._noise = wp.array(_unit(noise, model), dtype=wp.vec3)
         self._start: dict[Callable, wp.array] = {}
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
-        self._edges = _edges(model)
-        bodies = model.vert_body.numpy()[self._edges[:, 0]]
-        self._first = np.searchsorted(bodies, np.arange(model.n_body))
+        self._before = wp.empty(model.n_tet, dtype=wp.mat33)
+        self._change = wp.empty(model.n_body, dtype=float)
         self._at: np.ndarray | None = None
         self._of_bodies = np.zeros((2, model.n_body))
 
     def rates(self, x: wp.array) -> tuple[float, float]:
-        """``omega`` and ``damping_rate``, or those of a former call while shapes are ``CLOSE``.
+        """``omega`` and ``damping_rate``, or those of a former call while shapes are close to it.
 
-        Rigid motion changes no rate, and the shape of a body only matters as far as it could come
-        to have the largest one.
+        Rigid motion changes no rate. A body whose own rates are far below the largest may change
+        its shape by more than the others until they are found again.
         """
-        at = x.numpy()
-        if self._at is None or not self._close(at):
-            self._at = at.copy()
+        if self._at is None or not self._close(x):
+            self._at = x.numpy().copy()
+            self._remember(x)
             squares = self._bounds(forces.apply_stiffness, x)
             self._of_bodies = np.array([squares**0.5, self._damping_rates(x)])
         omega, rate = self._of_bodies.max(axis=1).tolist()
         return omega, rate
 
-    def _close(self, at: np.ndarray) -> bool:
-        """Whether the rates of the bodies, by what their edges changed, are below the largest."""
-        before, now = (
-            np.linalg.norm(x[self._edges[:, 1]] - x[self._edges[:, 0]], axis=1)
-            for x in (self._at, at)
-        )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            change = np.maximum.reduceat(np.abs(now / before - 1.0), self._first)
-        growth = (1.0 + STEEP * change) / (1.0 + CLOSE)
-        most = self._of_bodies.max(axis=1)
-        grown = self._of_bodies * [growth, growth**2]
-        return bool((grown.max(axis=1) <= most).all())
+    def _remember(self, x: wp.array) -> None:
+        """Keep the shapes at ``x`` [m]."""
+        m = self._model
+        wp.launch(shape.remember, dim=m.n_tet, inputs=[m.tets, x], outputs=[self._before])
+
+    def _close(self, x: wp.array) -> bool:
+        """Whether the rates at the shapes kept do for those at ``x`` [m]."""
+        m = self._model
+        self._change.zero_()
+        inputs = [m.tets, m.vert_body, self._before, x]
+        wp.launch(shape.changes, dim=m.n_tet, inputs=inputs, outputs=[self._change])
+        most = self._of_bodies.max(axis=1, keepdims=True)
+        slow = (self._of_bodies * [[SLOWER], [SLOWER**2]] <= most).all(axis=0)
+        allowed = np.where(slow, MUCH, LITTLE)
+        return bool(np.isfinite(most).all() and (self._change.numpy() <= allowed).all())
 
     def omega(self, x: wp.array) -> float:
         """Angular frequency [1/s] of the fastest mode at the positions ``x`` [m].
@@ -113,6 +116,8 @@ class Spectrum:
             if apply.__name__ in starts
         }
         self._at = starts.get("at")
+        if self._at is not None:
+            self._remember(wp.array(self._at, dtype=wp.vec3))
         self._of_bodies = starts.get("of_bodies", self._of_bodies)
 
     def _damping_rates(self, x: wp.array) -> np.ndarray:
@@ -192,13 +197,6 @@ class Spectrum:
     def _add_up(self, row: int) -> None:
         inputs = [self._body_chunk, self._part, row]
         wp.launch(lanczos.add_up, dim=self._model.n_body, inputs=inputs, outputs=[self._coef])
-
-
-def _edges(model: Model) -> np.ndarray:
-    """Vertices of every tet edge, shape (n, 2)."""
-    start, second = model.vn_start.numpy(), model.vn_vert.numpy()
-    first = np.repeat(np.arange(model.n_vert, dtype=np.int32), np.diff(start))
-    return np.stack([first, second], axis=1)[first < second]
 
 
 def _chunks(body_vert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,6 +22,7 @@ RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
 TRAVEL = 0.025  # of the shortest mean edge: the same, for an impact without a trace of overlap
 PATIENCE = 2.0  # stable steps, at most, that such an impact is worth
+BLURRED = 1.05  # times the stable step: how well that is known
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 let some pass
 KEEP = (
     0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
@@ -79,7 +80,7 @@ def fault(dt: float, omega: float, speed: float, thickness: float) -> str:
         speed: largest relative speed [m/s]
         thickness: of the thinnest body [m]
     """
-    if dt * omega > 2.0:
+    if dt * omega > 2.0 * BLURRED:
         return f"a step of {dt:.3g} s is unstable, the longest stable one is {2.0 / omega:.3g} s"
     if dt * speed > LEAP * thickness:
         way = f"bodies move {dt * speed:.3g} m against each other in a step of {dt:.3g} s"

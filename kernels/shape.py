@@ -1,0 +1,55 @@
+"""How much the tets of a body have changed their shape; rigid motion changes none.
+
+    G = D E,  change = largest |entry| of G^T G - 1        D edges of the tet now, E inverse before
+
+E is kept from the positions to compare with. A tet that was flat then has changed without limit.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.geometry import NONE
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def tet_edges(t: wp.vec4i, x: wp.array[wp.vec3]) -> wp.mat33:
+    """Edges from the first corner, as columns [m]."""
+    a = x[t[0]]
+    return wp.matrix_from_cols(x[t[1]] - a, x[t[2]] - a, x[t[3]] - a)
+
+
+@wp.kernel
+def remember(
+    # in
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    before: wp.array[wp.mat33],  # (n_tet,) [1/m] E
+):
+    """One thread per tet."""
+    q = wp.tid()
+    before[q] = wp.inverse(tet_edges(tets[q], x))
+
+
+@wp.kernel
+def changes(
+    # in
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    vert_body: wp.array[int],  # (n_vert,)
+    before: wp.array[wp.mat33],  # (n_tet,) [1/m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out, added to
+    change: wp.array[float],  # (n_body,) largest of its tets
+):
+    """One thread per tet."""
+    q = wp.tid()
+    g = tet_edges(tets[q], x) @ before[q]
+    s = wp.transpose(g) @ g - wp.identity(n=3, dtype=float)
+    most = float(0.0)
+    for i in range(3):
+        for j in range(3):
+            most = wp.max(most, wp.abs(s[i, j]))
+    if not wp.ddot(s, s) < NONE or wp.determinant(before[q]) == 0.0:
+        most = NONE
+    wp.atomic_max(change, vert_body[tets[q][0]], most)

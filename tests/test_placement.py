@@ -59,3 +59,11 @@ def test_a_body_is_refused_where_rounding_drowns_its_gap_at_rest(scale):
         else:
             with pytest.raises(ValueError, match=r"body 'remote' is .* m from the origin: beyond"):
                 Simulation(scene)
+
+
+def test_fixed_bodies_in_one_place_are_not():
+    scene = Scene()
+    for _ in range(2):
+        scene.add_body(box(EDGE, 2), RUBBER, fixed=True)
+    scene.add_body(box(EDGE, 1), RUBBER, (1.0, 0.0, 0.0))
+    Simulation(scene)

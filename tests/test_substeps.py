@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from warp_contact import substeps
+from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box, substeps
 from warp_contact.forces import MARGIN
 
 OMEGA = 1000.0  # [1/s]
@@ -72,3 +72,17 @@ def test_a_step_that_the_user_chose_is_refused_where_it_is_unstable_or_jumps_thr
     stable, still, fast = 2.0 / OMEGA, 0.0, substeps.LEAP * THICKNESS * OMEGA
     assert "unstable" in fault(1.06 * stable, still) and not fault(1.04 * stable, still)
     assert "thinnest body" in fault(1.01 / OMEGA, fast) and not fault(0.99 / OMEGA, fast)
+
+
+def test_bodies_of_other_worlds_are_not_fast_against_each_other():
+    def sim(*worlds):
+        scene = Scene(gravity=(0.0, 0.0, 0.0))
+        for k, world in enumerate(worlds):
+            v = (20.0 * (-1.0) ** k, 0.0, 0.0)
+            rubber = NeoHookean(1e5, 0.3, 1000.0)
+            scene.add_body(box(0.05, 3), rubber, (k, 0.0, 0.0), velocity=v, world=world)
+        return Simulation(scene, substeps=64)
+
+    sim(0, 1).step_frame()
+    with pytest.raises(SimulationError, match=r"substeps=64 is too few: bodies move 0\.0104 m"):
+        sim(0, 0).step_frame()

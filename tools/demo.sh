@@ -6,7 +6,7 @@ CDPATH='' cd -- "$(dirname -- "$0")/.."
 set -- render
 . tools/venv.sh
 
-echo "simulating 60 frames of the bowl (the first run compiles the kernels, about a minute)"
+echo "simulating 60 frames of the bowl (the first run compiles the kernels, about half a minute)"
 .venv/bin/warp-contact run bowl --frames 60 --substeps 64 --out out/bowl >/dev/null # progress: stderr
 .venv/bin/warp-contact render out/bowl --frames=-1 --quiet
 echo "USD      $PWD/out/bowl/bowl.usda"

@@ -7,16 +7,10 @@ E is kept from the positions to compare with. A tet that was flat then has chang
 
 import warp as wp
 
+from warp_contact.kernels import tet as element
 from warp_contact.kernels.geometry import NONE
 
 wp.set_module_options({"enable_backward": False})
-
-
-@wp.func
-def tet_edges(t: wp.vec4i, x: wp.array[wp.vec3]) -> wp.mat33:
-    """Edges from the first corner, as columns [m]."""
-    a = x[t[0]]
-    return wp.matrix_from_cols(x[t[1]] - a, x[t[2]] - a, x[t[3]] - a)
 
 
 @wp.kernel
@@ -29,7 +23,7 @@ def remember(
 ):
     """One thread per tet."""
     q = wp.tid()
-    before[q] = wp.inverse(tet_edges(tets[q], x))
+    before[q] = wp.inverse(element.edges(tets[q], x))
 
 
 @wp.kernel
@@ -44,7 +38,7 @@ def changes(
 ):
     """One thread per tet."""
     q = wp.tid()
-    g = tet_edges(tets[q], x) @ before[q]
+    g = element.rate(q, tets, before, x)
     s = wp.transpose(g) @ g - wp.identity(n=3, dtype=float)
     most = float(0.0)
     for i in range(3):

@@ -21,11 +21,16 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
+def edges(t: wp.vec4i, u: wp.array[wp.vec3]) -> wp.mat33:
+    """Differences of a nodal field from the first corner, as columns: Ds for u = x."""
+    u0 = u[t[0]]
+    return wp.matrix_from_cols(u[t[1]] - u0, u[t[2]] - u0, u[t[3]] - u0)
+
+
+@wp.func
 def rate(q: int, tets: wp.array[wp.vec4i], pose: wp.array[wp.mat33], u: wp.array[wp.vec3]):
     """Gradient of a nodal field over tet q: F for u = x, its differential for u = dx."""
-    t = tets[q]
-    u0 = u[t[0]]
-    return wp.matrix_from_cols(u[t[1]] - u0, u[t[2]] - u0, u[t[3]] - u0) * pose[q]
+    return edges(tets[q], u) * pose[q]
 
 
 @wp.func

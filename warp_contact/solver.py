@@ -173,7 +173,7 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
 
 
 def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Stages 1 and 2: contacts of edges across other bodies at ``x``."""
+    """Stages 1 and 2: contacts of edges across other bodies at ``x``; ``found`` is 0 without."""
     look = partial(detect.find_crossings, model, x0, x, work, fresh)
     wp.capture_if(work.candidates.edges.n, look, work.n_crossing.zero_)
 

@@ -18,7 +18,7 @@ LADDER = (  # a module imports from lower rungs only
     {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"}
     | {"rest", "fields", "placement"},
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},
-    {"solver"},
+    {"solver", "pace"},
     {"simulation"},
     {"__init__", "commands"},
     {"cli"},

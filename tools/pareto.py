@@ -67,8 +67,9 @@ def main() -> int:
                 limit = min(QUICK_LIMIT, max(1.0, EARLY * left / count(True)))
             points += one(shown, args.quick, args.python, limit)
         rounds.append(points)
-    points = choose([median(same) for same in zip(*rounds, strict=True)])
-    save(args.out, head(args.python, repeats, perf_counter() - begin), titles, points)
+        # After every round: a long run leaves what it has.
+        points = choose([median(same) for same in zip(*rounds, strict=True)])
+        save(args.out, head(args.python, len(rounds), perf_counter() - begin), titles, points)
     return 0
 
 

@@ -10,26 +10,19 @@ import warp as wp
 
 from warp_contact import checkpoint, solver
 from warp_contact.assemble import assemble
-from warp_contact.diagnosis import flattest_tet, lost_vertex, vertex_name
+from warp_contact.diagnosis import lost_vertex, vertex_name
 from warp_contact.errors import SimulationError
 from warp_contact.fields import contact_fields
 from warp_contact.forces import stages_for
 from warp_contact.measure import Measure, Meter
+from warp_contact.pace import Pace
 from warp_contact.progress import Progress
 from warp_contact.ready import load_kernels
 from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.rest import Rest, keep_forces
 from warp_contact.scene import Body, Scene
 from warp_contact.spectrum import Spectrum
-from warp_contact.substeps import (
-    fault,
-    raised,
-    stays_damped,
-    stays_stable,
-    steps_in_frame,
-    steps_per_second,
-    with_penalty,
-)
+from warp_contact.substeps import raised, stays_damped, stays_stable
 from warp_contact.types import Capacity, State
 from warp_contact.work import Work, allocate_work
 
@@ -85,11 +78,11 @@ class Simulation:
         self.fps = fps
         self.frame = 0
         self.substeps = 0
-        self._wanted = substeps
         self.device = _device(device)
         with wp.ScopedDevice(self.device):
             self.model, self.state = assemble(scene)
             load_kernels(self.model, self.device)
+            self._pace = Pace(self.model, self.response, fps, substeps)
             self._spectrum = Spectrum(self.model)
             self._meter = Meter(self.model)
             # Without weight, what hardly moves need not be held by anything: it flies.
@@ -100,11 +93,6 @@ class Simulation:
         inv_mass = self.model.inv_mass.numpy()
         mobile = float(self.model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
         self._unit = UNIT * (mobile if mobile > 0.0 else 1.0)
-        self._thickness = float(self.model.body_thickness.numpy().min())
-        self._edge = float(self.model.body_edge.numpy().min())
-        of_bodies = np.unique(self.model.body_world.numpy(), return_inverse=True)[1]
-        self._world = of_bodies[self.model.vert_body.numpy()]
-        self._largest_inv_mass = float(inv_mass.max())
         self._graphs: dict[tuple[int, bool], wp.Graph] = {}
         self._search: bool | None = None  # whether some overlap was not created by a step
         self._dt: float | None = None
@@ -149,7 +137,7 @@ class Simulation:
             while self._search is None or self._grow():
                 self._search = solver.overlaps(self.model, self.state, self._work)
             omega, rate = self._rates or self._spectrum.rates(self.state.x)
-            self._check_wanted(omega)
+            self._pace.check(self.state, omega, self.frame + 1)
             last, halved = self.substeps, 0
             for _attempt in range(ATTEMPTS):
                 dt = self._run(omega, rate, last)
@@ -159,7 +147,7 @@ class Simulation:
                 lost = lost_vertex(self.state)
                 if lost is not None:
                     self._restore()
-                    if self._wanted or halved == HALVED or lost_vertex(self.state) is not None:
+                    if self._pace.wanted or halved == HALVED or lost_vertex(self.state) is not None:
                         raise SimulationError(
                             f"frame {self.frame + 1}: {vertex_name(self.model, lost)} is no longer "
                             f"finite ({self.substeps} substeps)"
@@ -168,7 +156,7 @@ class Simulation:
                     omega, rate = 2.0 * omega, 2.0 * rate
                     continue
                 after = self._spectrum.rates(self.state.x)
-                stable = self._wanted is not None or stays_stable(dt, after[0], rate > 0.0)
+                stable = self._pace.wanted is not None or stays_stable(dt, after[0], rate > 0.0)
                 if stable and stays_damped(dt, rate, after[1]):
                     break
                 omega, rate = raised((omega, rate), after)
@@ -273,7 +261,8 @@ class Simulation:
 
     def _fingerprint(self) -> str:
         sleeping = self._rest is not None
-        return checkpoint.fingerprint(self.model, self.response, self.fps, self._wanted, sleeping)
+        settings = self.response, self.fps, self._pace.wanted, sleeping
+        return checkpoint.fingerprint(self.model, *settings)
 
     def _run(self, omega: float, rate: float, last: int) -> float:
         """Step one frame at the rates [1/s] given, after ``last`` steps; return the step [s]."""
@@ -284,7 +273,7 @@ class Simulation:
             work.impulse.zero_()
             work.pair_key.fill_(-1)
             work.pair_total.zero_()
-        n = self._wanted or steps_in_frame(self._steps_per_second(omega), self.fps, last)
+        n = self._pace.steps(self.state, omega, last, self.frame + 1)
         dt = 1.0 / (self.fps * n)
         stages = stages_for(rate, dt)
         if self._dt is not None and dt != self._dt:
@@ -299,41 +288,6 @@ class Simulation:
         wp.capture_launch(self._graph(stages))
         self.substeps = n
         return dt
-
-    def _steps_per_second(self, omega: float) -> float:
-        """Steps [1/s] at the frequency [1/s] and the state given, see ``substeps``."""
-        if not math.isfinite(omega):
-            tet = flattest_tet(self.model, self.state.x)
-            raise SimulationError(f"frame {self.frame + 1}: {tet} is too flat: no step is stable")
-        omega = self._with_response(omega)
-        return steps_per_second(omega, self._speed(), self._thickness, self._edge)
-
-    def _with_response(self, omega: float) -> float:
-        """The frequency [1/s] of the elastic forces, or that of a penalty with them."""
-        if isinstance(self.response, Penalty):
-            return with_penalty(omega, self.response.stiffness, self._largest_inv_mass)
-        return omega
-
-    def _speed(self) -> float:
-        """Largest relative speed within a world in the frame to come [m/s]."""
-        v = self.state.v.numpy()
-        most, least = np.full((2, self._world.max() + 1, 3), -np.inf)
-        np.maximum.at(most, self._world, v)
-        np.maximum.at(least, self._world, -v)
-        speed = float(np.linalg.norm(most + least, axis=1).max())
-        return speed + float(np.linalg.norm(self.model.gravity)) / self.fps
-
-    def _check_wanted(self, omega: float) -> None:
-        """Refuse steps that the user chose too long at the frequency ``omega`` [1/s]."""
-        if self._wanted is None:
-            return
-        speed = 0.0 if self.frame else self._speed()
-        dt = 1.0 / (self.fps * self._wanted)
-        wrong = fault(dt, self._with_response(omega), speed, self._thickness)
-        if wrong:
-            raise SimulationError(
-                f"frame {self.frame + 1}: substeps={self._wanted} is too few: {wrong}"
-            )
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured steps of a frame, with so many stages of damping."""

@@ -20,7 +20,7 @@ LADDER = (  # a module imports from lower rungs only
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},
     {"solver", "pace"},
     {"simulation"},
-    {"__init__", "commands"},
+    {"__init__", "commands", "runs"},
     {"cli"},
     {"__main__"},
 )

@@ -8,8 +8,8 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, TetMesh, box
-from warp_contact.commands import line_of
 from warp_contact.kernels import passing
+from warp_contact.runs import line_of
 
 SOFT = NeoHookean(1e5, 0.3, 1000.0)
 PLATE = 2.0, 2.0, 0.1  # [m]

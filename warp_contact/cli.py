@@ -12,7 +12,7 @@ from pathlib import Path
 
 import warp as wp
 
-from warp_contact import __version__, commands
+from warp_contact import __version__, commands, runs
 from warp_contact.errors import SimulationError, UsageError
 
 
@@ -95,8 +95,8 @@ def add_run(group) -> None:
     add("--out", required=True, type=Path, metavar="DIR", help="directory of the results")
     add(
         "--response",
-        choices=commands.RESPONSES,
-        default=commands.RESPONSES[0],
+        choices=runs.RESPONSES,
+        default=runs.RESPONSES[0],
         help="default: %(default)s",
     )
     add("--device", metavar="NAME", help="cpu, cuda:0, ...; default: Warp's")
@@ -115,7 +115,7 @@ def add_run(group) -> None:
     add("--resume", action="store_true", help="go on from DIR/checkpoint.npz, up to frame N")
     add("--quiet", action="store_true", help="no progress line and no summary")
     add("--flatten", action="store_true", help="also write everything into one .usdc")
-    command.set_defaults(command=commands.run)
+    command.set_defaults(command=runs.run)
 
 
 def add_render(group) -> None:

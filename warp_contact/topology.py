@@ -141,3 +141,18 @@ def check_fans(surface: np.ndarray, edges: np.ndarray) -> None:
     if len(bad):
         v = int(vertex[bad].min())
         raise MeshError(f"surface vertex {v} is not manifold: its triangles form several fans")
+
+
+def morton_codes(x: np.ndarray) -> np.ndarray:
+    """Place of each point along a Z-order curve through their box, shape (n,), uint64.
+
+    The bits of the three coordinates in turns (Morton 1966), 21 of each.
+    """
+    low, size = x.min(axis=0), np.ptp(x, axis=0).max()
+    cell = ((x - low) / (size or 1.0) * (2**21 - 1)).astype(np.uint64)
+    code = np.zeros(len(x), dtype=np.uint64)
+    for bit in range(21):
+        for axis in range(3):
+            one = (cell[:, axis] >> np.uint64(bit)) & np.uint64(1)
+            code |= one << np.uint64(3 * bit + axis)
+    return code

@@ -1,9 +1,11 @@
-"""What is timed: the six scenes, piles of more and more spheres, more and more worlds."""
+"""What is timed: six scenes, piles of more and more spheres, more and more worlds, mesh orders."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+
+import numpy as np
 
 import warp_contact as wc
 from warp_contact import scenes
@@ -23,6 +25,8 @@ PILES = 1_000, 10_000, 100_000  # vertices
 WORLDS = 1, 16, 256
 LARGE_PILE, LARGE_WORLDS = 1_000_000, 4096
 SERIES_FRAMES = 4  # of a pile or of worlds
+ORDERS = "generated", "shuffled", "reordered"
+CELLS = 40  # along a block of 1 m whose numbering is shuffled
 
 RADIUS = 0.05  # of a sphere [m]
 BALL = 41  # its vertices
@@ -58,6 +62,8 @@ def cases(quick: bool, large: bool, fraction: float) -> dict[str, Case]:
         found[f"pile_{n}"] = Case(partial(pile, n), SERIES_FRAMES, "pile")
     for n in worlds:
         found[f"worlds_{n}"] = Case(partial(copies, n), SERIES_FRAMES, "worlds")
+    for order in () if quick else ORDERS:
+        found[f"block_{order}"] = Case(partial(block, order), 1)
     return found
 
 
@@ -101,4 +107,19 @@ def copies(count: int) -> wc.Scene:
                 label=f"{body.label}_{world}",
                 world=world,
             )
+    return scene
+
+
+def block(order: str) -> wc.Scene:
+    """One fine block in flight: what the numbering of a mesh costs."""
+    mesh = wc.box(1.0, CELLS)
+    if order != "generated":
+        rng = np.random.default_rng(0)
+        old = rng.permutation(len(mesh.vertices))
+        tets = np.argsort(old)[mesh.tets][rng.permutation(len(mesh.tets))]
+        mesh = wc.TetMesh(mesh.vertices[old], tets)
+    if order == "reordered":
+        mesh = mesh.reordered()[0]
+    scene = wc.Scene(friction=0.0)
+    scene.add_body(mesh, rubber())
     return scene

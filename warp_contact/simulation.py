@@ -26,6 +26,7 @@ from warp_contact.substeps import raised, stays_damped, stays_stable
 from warp_contact.types import Capacity, State
 from warp_contact.work import Work, allocate_work
 
+NEIGHBOURS = 8  # pairs with a contact force for each body that there is room for at first
 UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
 HALVED = 3  # times that the steps of a frame are halved because its state did not stay finite
 ATTEMPTS = 12  # at a frame, with shorter steps each time
@@ -88,7 +89,8 @@ class Simulation:
             # Without weight, what hardly moves need not be held by anything: it flies.
             sleeping = sleeping and any(self.model.gravity)
             self._rest = Rest(self.model, self.state, fps) if sleeping else None
-            self._work: Work = self._allocate(self.state, Capacity())
+            pairs = max(Capacity.pairs, NEIGHBOURS * self.model.n_body)
+            self._work: Work = self._allocate(self.state, Capacity(pairs=pairs))
             self._saved = State(wp.clone(self.state.x), wp.clone(self.state.v))
         inv_mass = self.model.inv_mass.numpy()
         mobile = float(self.model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
@@ -310,10 +312,12 @@ class Simulation:
             return False
         old = astuple(self._work.capacity)
         capacity = [max(have, 2 * int(n)) for have, n in zip(old, needed, strict=True)]
-        before, self._work = self._work, self._allocate(self._saved, Capacity(*capacity))
-        if self._rest:
-            keep_forces(before, self._work)
+        before = self._work if self._rest else None
         self._graphs.clear()
+        del self._work  # old and new at once would be the peak of the memory
+        self._work = self._allocate(self._saved, Capacity(*capacity))
+        if before:
+            keep_forces(before, self._work)
         return True
 
     def _restore(self) -> None:

@@ -155,9 +155,12 @@ def go_on(
     motion: wp.array[float],  # (n_body,) [m] 0 on return
     pace: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
     way: wp.array[float],  # (n_body + n_plane,) [m]
+    # out
+    n_contact: wp.array[int],  # (1,) 0 for the look to come
 ):
     """One thread per body."""
     m = wp.tid()
+    n_contact[0] = 0
     way[m] = way[m] + motion[m]
     pace[m] = wp.max(motion[m], FADING * pace[m])
     motion[m] = 0.0

@@ -58,7 +58,10 @@ def find_crossings(
     wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no crossing
     # out
     crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact, 0 elsewhere
-    contact: wp.array[EdgeContact],  # (capacity,) which contact
+    place: wp.array[int],  # (capacity,) of it in ``contact``
+    contact: wp.array[EdgeContact],  # (contacts,) in any order; one too many is left out
+    # out, added to
+    n_contact: wp.array[int],  # (1,)
 ):
     """For each candidate, and for the room behind them."""
     for c in range(wp.tid(), crossing.shape[0], threads):
@@ -84,7 +87,10 @@ def find_crossings(
         )
         if found.found:
             crossing[c] = 1
-            contact[c] = found
+            k = wp.atomic_add(n_contact, 0, 1)
+            place[c] = k
+            if k < contact.shape[0]:
+                contact[k] = found
 
 
 @wp.kernel
@@ -97,7 +103,8 @@ def edge_contacts(
     vert_body: wp.array[int],  # (n_vert,)
     n_hit: wp.array[int],  # (1,)
     crossing_at: wp.array[int],  # (capacity + 1,) contacts before each candidate
-    contact: wp.array[EdgeContact],  # (capacity,)
+    place: wp.array[int],  # (capacity,)
+    contact: wp.array[EdgeContact],  # (contacts,)
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step, for the weights
     # out
     vert: wp.array2d[int],  # (capacity, 5)
@@ -110,13 +117,15 @@ def edge_contacts(
     """For each candidate: its contact, behind those of the vertices."""
     for k in range(wp.tid(), n_pair[0], threads):
         c = n_hit[0] + crossing_at[k]
-        if crossing_at[k + 1] == crossing_at[k] or c >= normal.shape[0]:
+        if crossing_at[k + 1] == crossing_at[k]:
+            continue
+        if c >= normal.shape[0] or place[k] >= contact.shape[0]:
             continue
         e = edges[pair[k][0]]
         i = e[0]
         j = e[1]
         body = pair[k][1]
-        found = contact[k]
+        found = contact[place[k]]
         t = found.vert
         w = found.w
         if found.ridge:

@@ -38,7 +38,8 @@ def track(model: Model, x: wp.array, work: Work) -> None:
     """Let the bodies go on to ``x``, where candidates are looked at."""
     c = work.candidates
     _move(model, x, work)
-    wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=[c.motion, c.pace, c.way])
+    outputs = [c.motion, c.pace, c.way, work.n_place]
+    wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=outputs)
 
 
 def _move(model: Model, x: wp.array, work: Work) -> None:

@@ -59,7 +59,7 @@ def edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
         crossing.edge_contacts,
         work.capacity.edges,
         inputs=[c.n, c.pair, model.edges, model.vert_body, work.n_hit]
-        + [work.crossing_at, work.crossing, x0],
+        + [work.crossing_at, work.place, work.crossing, x0],
         outputs=_records(work),
     )
     _count(work, work.n_crossing)

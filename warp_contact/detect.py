@@ -30,7 +30,7 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
 
 
 def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Set ``crossing`` and ``crossing_at``: edges across a body at ``x`` in a step from ``x0``."""
+    """Set ``crossing_at``, ``place`` and ``crossing``: edges across a body at ``x`` from ``x0`` on."""
     candidates.track(model, x, work)
     c = work.candidates.edges
     launch_over(
@@ -39,6 +39,6 @@ def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: b
         inputs=[fresh, work.candidates.skin, c.n, c.pair, c.items, c.item, work.surface.id]
         + [model.tris, model.edges, model.vert_body, model.body_edge]
         + [work.candidates.pace, work.candidates.way, x0, x],
-        outputs=[c.wake, work.crossing_at, work.crossing],
+        outputs=[c.wake, work.crossing_at, work.place, work.crossing, work.n_place],
     )
     wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)

@@ -34,7 +34,9 @@ class Work:
         candidates: what may touch
         hit_at: hits before each candidate vertex, shape (capacity.verts + 1,)
         hit_vert, hit_body, hit_layer, hit_depth, hit_dir: the hits, shape (capacity.contacts,)
-        crossing: the contacts of candidate edges, shape (capacity.edges,)
+        crossing: contacts of candidate edges in any order, shape (capacity.contacts,)
+        n_place: how many there are, shape (1,)
+        place: that of each candidate edge among them, shape (capacity.edges,)
         crossing_at: contacts before each candidate edge, shape (capacity.edges + 1,)
         layer: layer of the propagation, shape (1,)
         pending: whether it goes on, shape (1,)
@@ -84,6 +86,8 @@ class Work:
     hit_depth: wp.array
     hit_dir: wp.array
     crossing: wp.array
+    n_place: wp.array
+    place: wp.array
     crossing_at: wp.array
     layer: wp.array
     pending: wp.array
@@ -159,7 +163,9 @@ def allocate_work(
         hit_layer=_ints(m),
         hit_depth=_floats(m),
         hit_dir=_vectors(m),
-        crossing=wp.zeros(capacity.edges, dtype=EdgeContact),
+        crossing=wp.zeros(m, dtype=EdgeContact),
+        n_place=_ints(1),
+        place=_ints(capacity.edges),
         crossing_at=crossing_at,
         layer=_ints(1),
         pending=_ints(1),

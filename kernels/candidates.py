@@ -10,7 +10,8 @@ the skin; the other half is for what impulses and the closure add to the predict
 
 Half the span is the number of steps that candidates last. It is the same for all bodies, and such
 that the mean of them has a skin of MEAN edges: some fast bodies do not wear out the candidates of a
-pile at rest, and where all are fast the lists stay short. A body with nothing near has the LONGEST.
+pile at rest, and where all are fast the lists stay short. A body that has nothing near, even if all
+had the LONGEST, gets it.
 
 Most candidates are not close to touching. A pair that is found apart by some distance sleeps until
 both bodies have come that way together; ``way`` adds up the largest motion of a body in each look.
@@ -112,14 +113,13 @@ def widest_skins(
     # in
     edge: float,  # shortest mean edge of a body [m]
     fastest: wp.array[float],  # (1,) [m]
-    total: wp.array[int],  # (1,) sum of the motions
     motion: wp.array[float],  # (n_body,) [m]
     # out
     skin: wp.array[float],  # (n_body,) [m]
 ):
-    """One thread per body: the skin it would have next to the fastest body."""
+    """One thread per body: the longest that it may get."""
     m = wp.tid()
-    skin[m] = own_skin(motion[m], edge, span(total[0], motion.shape[0])) + fastest[0]
+    skin[m] = own_skin(motion[m], edge, LONGEST) + fastest[0]
 
 
 @wp.kernel

@@ -63,13 +63,13 @@ def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
         inputs=[c.edge, c.motion],
         outputs=[c.fastest, c.total],
     )
-    moving = [c.edge, c.fastest, c.total, c.motion]
-    wp.launch(candidates.widest_skins, dim=model.n_body, inputs=moving, outputs=[c.skin])
+    inputs = [c.edge, c.fastest, c.motion]
+    wp.launch(candidates.widest_skins, dim=model.n_body, inputs=inputs, outputs=[c.skin])
     _find_near(model, work)
     wp.launch(
         candidates.choose_skins,
         dim=model.n_body,
-        inputs=[*moving, work.near.n_near, work.near.near],
+        inputs=[c.edge, c.fastest, c.total, c.motion, work.near.n_near, work.near.near],
         outputs=[c.skin, c.stale],
     )
     _find_near(model, work)

@@ -4,6 +4,7 @@ from dataclasses import astuple, fields, replace
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, TetMesh, box, candidates, detect, solver
 from warp_contact.types import Capacity
@@ -134,6 +135,25 @@ def test_near_bodies_have_boxes_that_meet_and_none_that_touches_is_missed(rng, s
     assert not (near & ~meet).any() and (near == near.T).all()
     sure, _ = brute_force(scene, state.x.numpy().astype(float))
     assert all(near[i // 8, body] for i, body in sure) and near[0, 19]
+
+
+def test_a_fast_body_does_not_reach_for_others_with_its_own_skin(stages):
+    """Where it has the longest skin only because nothing is near, it lasts without candidates."""
+    found = []
+    for away in (0.06, 1.0):
+        scene, dt, v = Scene(), 1e-3, np.array([2.0, 0.0, 0.0])
+        scene.add_body(box(0.1, 2), RUBBER)
+        scene.add_body(box(0.1, 2), RUBBER, (0.1 + away, 0.0, 0.0), velocity=v)
+        model, state, work = stages(scene, dt=dt)
+        x1 = wp.array(state.x.numpy() + dt * state.v.numpy(), dtype=wp.vec3)
+        candidates.refresh(model, state.x, x1, work)
+        skin = work.candidates.skin.numpy()
+        pairs = work.candidates.edges.n.numpy()[0] + work.candidates.verts.n.numpy()[0]
+        found.append((skin[1] / (dt * v[0]), pairs))
+    (short, none), (long, none_either) = found
+    # Eight motions and a push when the other one is close, 64 when nothing is within these.
+    assert none == none_either == 0
+    assert short < 16.0 < 63.0 < long  # in float32
 
 
 def test_hits_are_sorted_by_vertex_and_body_with_planes_last(rng, stages, jittered, turned):

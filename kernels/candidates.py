@@ -11,7 +11,7 @@ the skin; the other half is for what impulses and the closure add to the predict
 Half the span is the number of steps that candidates last. It is the same for all bodies, and such
 that the mean of them has a skin of MEAN edges: some fast bodies do not wear out the candidates of a
 pile at rest, and where all are fast the lists stay short. A body that has nothing near, even if all
-had the LONGEST, gets it.
+had the LONGEST, gets it. One with more than MANY near takes the fastest of all as near.
 
 Most candidates are not close to touching. A pair that is found apart by some distance sleeps until
 both bodies have come that way together; ``way`` adds up the largest motion of a body in each look.
@@ -156,11 +156,12 @@ def go_on(
     pace: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
     way: wp.array[float],  # (n_body + n_plane,) [m]
     # out
-    n_contact: wp.array[int],  # (1,) 0 for the look to come
+    n_place: wp.array[int],  # (1,) 0: a look at the edges begins to count
 ):
     """One thread per body."""
     m = wp.tid()
-    n_contact[0] = 0
+    if m == 0:
+        n_place[0] = 0
     way[m] = way[m] + motion[m]
     pace[m] = wp.max(motion[m], FADING * pace[m])
     motion[m] = 0.0

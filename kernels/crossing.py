@@ -58,12 +58,15 @@ def find_crossings(
     wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no crossing
     # out
     crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact, 0 elsewhere
-    place: wp.array[int],  # (capacity,) of it in ``contact``
-    contact: wp.array[EdgeContact],  # (contacts,) in any order; one too many is left out
+    place: wp.array[int],  # (capacity,) index in ``contact`` where ``crossing`` is 1
+    contact: wp.array[EdgeContact],  # (contacts,) in any order
     # out, added to
-    n_contact: wp.array[int],  # (1,)
+    n_place: wp.array[int],  # (1,)
 ):
-    """For each candidate, and for the room behind them."""
+    """For each candidate, and for the room behind them.
+
+    Contacts that do not fit are left out; ``total_contacts`` counts crossings and asks for room.
+    """
     for c in range(wp.tid(), crossing.shape[0], threads):
         crossing[c] = 0
         if c >= n_pair[0]:
@@ -87,7 +90,7 @@ def find_crossings(
         )
         if found.found:
             crossing[c] = 1
-            k = wp.atomic_add(n_contact, 0, 1)
+            k = wp.atomic_add(n_place, 0, 1)
             place[c] = k
             if k < contact.shape[0]:
                 contact[k] = found

@@ -242,3 +242,30 @@ def test_options_that_make_no_run_are_refused(options, message):
 def test_an_empty_scene_is_refused():
     with pytest.raises(ValueError, match="the scene has no body"):
         Simulation(Scene())
+
+
+def test_without_memory_for_larger_buffers_the_last_frame_stays(monkeypatch):
+    sim = Simulation(heap())
+    for _ in sim.frames(2):
+        pass
+    x, measured = sim.positions(), sim.measure()
+    allocate = Simulation._allocate
+
+    def allocate_no_more(self, state, capacity):
+        if capacity.contacts > 10_000:
+            raise RuntimeError("no memory")
+        return allocate(self, state, capacity)
+
+    def outgrow(self, *rates):
+        self.state.x.fill_(1.0)  # a frame that is not finished
+        self._work.contacts.needed.fill_(10_000)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Simulation, "_allocate", allocate_no_more)
+        patch.setattr(Simulation, "_run", outgrow)
+        with pytest.raises(RuntimeError, match="no memory"):
+            sim.step_frame()
+    np.testing.assert_array_equal(sim.positions(), x)
+    assert sim.measure().energy == measured.energy
+    sim.step_frame()
+    assert sim.frame == 3

@@ -35,7 +35,7 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
 
 
 def track(model: Model, x: wp.array, work: Work) -> None:
-    """Let the bodies go on to ``x``, where candidates are looked at."""
+    """Let the bodies go on to ``x``, where candidates are looked at; ``n_place`` is 0 then."""
     c = work.candidates
     _move(model, x, work)
     outputs = [c.motion, c.pace, c.way, work.n_place]

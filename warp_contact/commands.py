@@ -1,4 +1,4 @@
-"""The commands of the command line but ``run``: each takes its arguments, returns an exit code."""
+"""The commands except ``run``; each takes its arguments and returns an exit code."""
 
 import importlib
 import importlib.util

@@ -30,7 +30,10 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
 
 
 def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Set ``crossing_at``, ``place`` and ``crossing``: edges across a body at ``x``."""
+    """Set ``crossing_at``, ``place`` and ``crossing``: edges across a body at ``x``.
+
+    The step begins at ``x0``; ``fresh``: no overlap is older than that.
+    """
     candidates.track(model, x, work)
     c = work.candidates.edges
     launch_over(

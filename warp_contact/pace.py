@@ -57,7 +57,16 @@ class Pace:
         return substeps.steps_in_frame(per_second, self.fps, last)
 
     def check(self, state: State, omega: float, frame: int) -> None:
-        """Raise SimulationError when steps that the user chose are too long at ``omega``."""
+        """Refuse steps that the user chose too long; their way in a step counts in frame 1 only.
+
+        Args:
+            state: at the start of the frame
+            omega: largest frequency of the elastic forces [1/s]
+            frame: number of the frame
+
+        Raises:
+            SimulationError: a step is unstable, or bodies could pass through each other
+        """
         if not self.wanted:
             return
         speed = self._speed(state) if frame == 1 else 0.0

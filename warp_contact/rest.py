@@ -154,9 +154,9 @@ class Rest:
         )
 
 
-def keep_forces(before: Work, after: Work) -> None:
+def keep_forces(impulse: wp.array, pair_key: wp.array, pair_total: wp.array, after: Work) -> None:
     """Copy the contact forces of the last frame, which those asleep still have, to a larger one."""
-    n = before.pair_key.shape[0]
-    wp.copy(after.impulse, before.impulse)
-    wp.copy(after.pair_key[:n], before.pair_key)
-    wp.copy(after.pair_total[:n], before.pair_total)
+    n = pair_key.shape[0]
+    wp.copy(after.impulse, impulse)
+    wp.copy(after.pair_key[:n], pair_key)
+    wp.copy(after.pair_total[:n], pair_total)

@@ -144,7 +144,6 @@ class Simulation:
             for _attempt in range(ATTEMPTS):
                 dt = self._run(omega, rate, last)
                 while self._grow():
-                    self._restore()
                     dt = self._run(omega, rate, last)
                 lost = lost_vertex(self.state)
                 if lost is not None:
@@ -252,10 +251,9 @@ class Simulation:
             room = len(rest.get("pair_key", ()))
             capacity = self._work.capacity
             capacity = replace(capacity, pairs=max(capacity.pairs, room))
-            self._work = self._allocate(self.state, capacity)
+            self._replace_work(capacity)
             if self._rest:
                 self._rest.restore(rest, self._work)
-        self._graphs.clear()
         self.frame, self.substeps = int(values["frame"]), int(values["substeps"])
         self._search = bool(values["search"]) if "search" in values else None
         self._dt = float(values["dt"]) if "dt" in values else None
@@ -306,19 +304,31 @@ class Simulation:
         return allocate_work(self.model, state, capacity, awake)
 
     def _grow(self) -> bool:
-        """Enlarge the buffers that the frame outgrew; True if there were any."""
-        needed = self._work.contacts.needed.numpy()
+        """Enlarge the buffers that the frame outgrew, and go back to its start; True if any."""
+        work = self._work
+        needed = work.contacts.needed.numpy()
         if not needed.any():
             return False
-        old = astuple(self._work.capacity)
+        self._restore()
+        old = astuple(work.capacity)
         capacity = [max(have, 2 * int(n)) for have, n in zip(old, needed, strict=True)]
-        before = self._work if self._rest else None
-        self._graphs.clear()
-        del self._work  # old and new at once would be the peak of the memory
-        self._work = self._allocate(self._saved, Capacity(*capacity))
-        if before:
-            keep_forces(before, self._work)
+        forces = work.impulse, work.pair_key, work.pair_total
+        del work
+        self._replace_work(Capacity(*capacity))
+        if self._rest:
+            keep_forces(*forces, self._work)
         return True
+
+    def _replace_work(self, capacity: Capacity) -> None:
+        """Allocate anew; old and new buffers at once would be the peak of the memory."""
+        before = self._work.capacity
+        self._graphs.clear()
+        del self._work
+        try:
+            self._work = self._allocate(self.state, capacity)
+        except RuntimeError:  # there is no memory for it
+            self._work = self._allocate(self.state, before)
+            raise
 
     def _restore(self) -> None:
         wp.copy(self.state.x, self._saved.x)

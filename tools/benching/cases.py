@@ -26,7 +26,7 @@ WORLDS = 1, 16, 256
 LARGE_PILE, LARGE_WORLDS = 1_000_000, 4096
 SERIES_FRAMES = 4  # of a pile or of worlds
 ORDERS = "generated", "shuffled", "reordered"
-CELLS = 40  # along a block of 1 m whose numbering is shuffled
+CELLS = 40  # along a block of 1 m, in these orders
 
 RADIUS = 0.05  # of a sphere [m]
 BALL = 41  # its vertices

@@ -30,7 +30,7 @@ wp.set_module_options({"enable_backward": False})
 
 LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
 MEAN = wp.constant(0.08)  # of the shortest edge: longer lists cost more than they save
-SHORTEST = wp.constant(8.0)  # span
+SHORTEST = wp.constant(3.0)  # span
 LONGEST = wp.constant(64.0)  # span
 UNIT = wp.constant(1.0e4)  # counts of an edge, for a sum that does not depend on its order
 CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves
@@ -151,6 +151,8 @@ def choose_skins(
 
 @wp.kernel
 def go_on(
+    # in
+    hold: bool,  # contacts of edges have places already, to which a look adds
     # in, out
     motion: wp.array[float],  # (n_body,) [m] 0 on return
     pace: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
@@ -160,7 +162,7 @@ def go_on(
 ):
     """One thread per body."""
     m = wp.tid()
-    if m == 0:
+    if m == 0 and not hold:
         n_place[0] = 0
     way[m] = way[m] + motion[m]
     pace[m] = wp.max(motion[m], FADING * pace[m])

@@ -20,9 +20,11 @@ only kept from getting one.
 import warp as wp
 
 from warp_contact.kernels.contact import REST, gap
-from warp_contact.kernels.geometry import NONE
+from warp_contact.kernels.geometry import NONE, projected_weights
 
 wp.set_module_options({"enable_backward": False})
+
+STRAY = wp.constant(1.0e-3)  # barycentric weight below which a vertex has left its triangle
 
 
 @wp.kernel
@@ -31,6 +33,7 @@ def leftover(
     threads: int,
     tolerance: float,  # of an edge; less is not worth a move
     deep: float,  # of an edge; less at the start of the step is not worth a search
+    strays: bool,  # count a vertex that left its triangle, or lies below it, as an overlap
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
@@ -47,7 +50,11 @@ def leftover(
     found: wp.array[int],  # (2,) 1 when any overlap is to be closed, and to be searched
     deep_found: wp.array[int],  # (1,) 1 when any has been to be searched since the frame began
 ):
-    """For each contact: the overlap at x."""
+    """For each contact: the overlap at x.
+
+    The gap of a vertex is that to a point of its triangle, along a direction that may not be its
+    normal: once it has slid it may overlap this or another one all the same.
+    """
     for c in range(wp.tid(), n_contact[0], threads):
         left[c] = 0.0
         if wp.length_sq(normal[c]) == 0.0:
@@ -57,6 +64,15 @@ def leftover(
         if d > tolerance * edge:
             left[c] = d
             found[0] = 1
+        if strays and coef[c, 0] == 1.0 and pair[c][1] < body_edge.shape[0]:
+            p = x[vert[c, 0]]
+            t0 = x[vert[c, 2]]
+            t1 = x[vert[c, 3]]
+            t2 = x[vert[c, 4]]
+            face = wp.normalize(wp.cross(t1 - t0, t2 - t0))
+            w = projected_weights(p, normal[c], t0, t1, t2)
+            if wp.min(w) < -STRAY or wp.dot(p - t0, face) < -tolerance * edge:
+                found[0] = 1
         if d > deep * edge and -closing[c] * dt[0] > deep * edge:
             found[1] = 1
             deep_found[0] = 1

@@ -6,7 +6,7 @@ Crossings are looked for where the impulses on the vertices lead.
 import warp as wp
 
 from warp_contact.kernels.candidates import CAREFUL, gap_to
-from warp_contact.kernels.edge_contact import EdgeContact, edge_contact
+from warp_contact.kernels.edge_contact import EdgeContact, edge_contact, is_same
 from warp_contact.kernels.geometry import NONE, projected_crossing, projected_weights
 from warp_contact.kernels.vertex_contact import SLIP
 
@@ -35,10 +35,22 @@ def clearance(
     return out
 
 
+@wp.func
+def is_among(found: EdgeContact, first: int, contact: wp.array[EdgeContact]) -> bool:
+    """Whether a list of contacts has the one that was found."""
+    k = first
+    while k >= 0:
+        if is_same(found, contact[k]):
+            return True
+        k = contact[k].next
+    return False
+
+
 @wp.kernel
 def find_crossings(
     # in
     threads: int,
+    hold: bool,  # contacts that have a place stay
     fresh: bool,  # there are no overlaps from before the step
     skin: wp.array[float],  # (n_body,) [m]
     n_pair: wp.array[int],  # (1,)
@@ -56,10 +68,10 @@ def find_crossings(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
     wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no crossing
-    # out
-    crossing: wp.array[int],  # (capacity + 1,) 1 where an edge makes a contact, 0 elsewhere
-    place: wp.array[int],  # (capacity,) index in ``contact`` where ``crossing`` is 1
+    place: wp.array[int],  # (capacity,) that of the first in ``contact``, where there are any
     contact: wp.array[EdgeContact],  # (contacts,) in any order
+    # out
+    crossing: wp.array[int],  # (capacity + 1,) contacts of the edge with the body
     # out, added to
     n_place: wp.array[int],  # (1,)
 ):
@@ -71,6 +83,14 @@ def find_crossings(
         crossing[c] = 0
         if c >= n_pair[0]:
             continue
+        if not hold:
+            place[c] = -1
+        last = place[c]
+        if last >= 0:
+            crossing[c] = 1
+            while contact[last].next >= 0:
+                last = contact[last].next
+                crossing[c] = crossing[c] + 1
         e = edges[pair[c][0]]
         i = e[0]
         j = e[1]
@@ -88,12 +108,37 @@ def find_crossings(
         found = edge_contact(
             surface, body, edge, fresh, reach, pair_tris[c], tri, tris, x0, x, edges[pair[c][0]]
         )
-        if found.found:
-            crossing[c] = 1
-            k = wp.atomic_add(n_place, 0, 1)
+        if not found.found or (last >= 0 and is_among(found, place[c], contact)):
+            continue
+        crossing[c] = crossing[c] + 1
+        k = wp.atomic_add(n_place, 0, 1)
+        if k >= contact.shape[0]:
+            continue
+        found.edge = pair[c][0]
+        found.body = body
+        found.next = -1
+        contact[k] = found
+        if last < 0:
             place[c] = k
-            if k < contact.shape[0]:
-                contact[k] = found
+        else:
+            contact[last].next = k
+
+
+@wp.func
+def at_start(c: EdgeContact, i: int, j: int, x: wp.array[wp.vec3]) -> EdgeContact:
+    """The contact of the edge from i to j with its weights at the start of the step."""
+    t = c.vert
+    if c.ridge:
+        start = projected_crossing(x[i], x[j], x[t[0]], x[t[1]], c.n)
+        if wp.length(start - wp.vec2(c.t, c.w[1])) < SLIP:
+            c.t = start[0]
+            c.w = wp.vec3(1.0 - start[1], start[1], 0.0)
+    else:
+        middle = x[i] + c.t * (x[j] - x[i])
+        w = projected_weights(middle, c.n, x[t[0]], x[t[1]], x[t[2]])
+        if wp.length(w - c.w) < SLIP:
+            c.w = w
+    return c
 
 
 @wp.kernel
@@ -116,43 +161,28 @@ def edge_contacts(
     depth: wp.array[float],  # (capacity,) [m]
     offset: wp.array[float],  # (capacity,) [m] gap = (sum coef x) . normal - offset
     pair_of: wp.array[wp.vec2i],  # (capacity,)
+    source: wp.array[int],  # (capacity,) place of the contact in ``contact``
 ):
-    """For each candidate: its contact, behind those of the vertices."""
+    """For each candidate: its contacts, behind those of the vertices."""
     for k in range(wp.tid(), n_pair[0], threads):
         c = n_hit[0] + crossing_at[k]
-        if crossing_at[k + 1] == crossing_at[k]:
-            continue
-        if c >= normal.shape[0] or place[k] >= contact.shape[0]:
-            continue
-        e = edges[pair[k][0]]
-        i = e[0]
-        j = e[1]
-        body = pair[k][1]
-        found = contact[place[k]]
-        t = found.vert
-        w = found.w
-        if found.ridge:
-            su = wp.vec2(found.t, w[1])
-            start = projected_crossing(x0[i], x0[j], x0[t[0]], x0[t[1]], found.n)
-            if wp.length(start - su) < SLIP:
-                found.t = start[0]
-                w = wp.vec3(1.0 - start[1], start[1], 0.0)
-        else:
-            middle = x0[i] + found.t * (x0[j] - x0[i])
-            start_w = projected_weights(middle, found.n, x0[t[0]], x0[t[1]], x0[t[2]])
-            if wp.length(start_w - w) < SLIP:
-                w = start_w
-        vert[c, 0] = i
-        vert[c, 1] = j
-        vert[c, 2] = t[0]
-        vert[c, 3] = t[1]
-        vert[c, 4] = t[2]
-        coef[c, 0] = 1.0 - found.t
-        coef[c, 1] = found.t
-        coef[c, 2] = -w[0]
-        coef[c, 3] = -w[1]
-        coef[c, 4] = -w[2]
-        normal[c] = found.n
-        depth[c] = found.d
-        offset[c] = 0.0
-        pair_of[c] = wp.vec2i(vert_body[i], body)
+        end = n_hit[0] + crossing_at[k + 1]
+        i = edges[pair[k][0]][0]
+        j = edges[pair[k][0]][1]
+        at = place[k]
+        while c < wp.min(end, normal.shape[0]) and at >= 0:
+            found = at_start(contact[at], i, j, x0)
+            vert[c, 0] = i
+            vert[c, 1] = j
+            coef[c, 0] = 1.0 - found.t
+            coef[c, 1] = found.t
+            for m in range(3):
+                vert[c, 2 + m] = found.vert[m]
+                coef[c, 2 + m] = -found.w[m]
+            normal[c] = found.n
+            depth[c] = found.d
+            offset[c] = 0.0
+            pair_of[c] = wp.vec2i(vert_body[i], pair[k][1])
+            source[c] = at
+            at = found.next
+            c += 1

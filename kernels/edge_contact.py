@@ -43,6 +43,7 @@ wp.set_module_options({"enable_backward": False})
 # Of both skins, less the way of both bodies. The impulses seldom use up the rest of it.
 SURE = wp.constant(0.125)
 SHARP = wp.constant(1.64)  # a ridge with a dihedral angle below 75 degrees is sharp
+TURNED = wp.constant(0.95)  # cosine: of two edges that are almost parallel, n turns in a step
 FLAT = wp.constant(2.0e-4)  # of an edge: an edge this deep lies in the face, whatever its direction
 
 
@@ -71,6 +72,20 @@ class EdgeContact:
     w: wp.vec3  # their weights
     ridge: bool
     half: float  # sine of half the dihedral angle of the ridge
+    edge: int  # its own
+    body: int  # the other one
+    next: int  # place of another contact of the same two, -1 for none
+    kept: wp.vec4  # [N s] friction and normal impulse so far
+
+
+@wp.func
+def is_same(a: EdgeContact, b: EdgeContact) -> bool:
+    """Whether two contacts of an edge with a body touch the same part of it, from one side."""
+    if a.ridge != b.ridge or wp.dot(a.n, b.n) < TURNED:
+        return False
+    if a.ridge and a.vert[0] == b.vert[1]:
+        return a.vert[1] == b.vert[0]
+    return a.vert == b.vert
 
 
 @wp.func

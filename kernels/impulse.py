@@ -20,14 +20,18 @@ Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add k
 (Tonge, Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly.
 A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
 
+Across a gap that is too wide for the surface to take the couple there is no friction in this step.
+
 Sweep j runs from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
 method, except at a contact where that change was a step too far. The last sweep is a plain one.
+Most contacts are soon done, and few clusters last long: between the first and the last sweep a
+contact is left alone while neither its impulses nor the velocities of its vertices change.
 """
 
 import warp as wp
 
 from warp_contact.kernels.contact import REST, gap, gradient
-from warp_contact.kernels.incidence import total
+from warp_contact.kernels.incidence import takes_part, total
 
 wp.set_module_options({"enable_backward": False})
 
@@ -48,6 +52,7 @@ def clamped(p: wp.vec3, bound: float) -> wp.vec3:
 def begin_contacts(
     # in
     threads: int,
+    friction: float,  # coefficient
     first: wp.array[int],  # (1,) contacts before this one keep their impulses
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
@@ -65,6 +70,7 @@ def begin_contacts(
     closing: wp.array[float],  # (capacity,) [m/s] approach that is allowed, < 0: overlap at x0
     open: wp.array[float],  # (capacity,) [m] g0, 0 where no surface can take the couple
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m] b_k
+    mu: wp.array[float],  # (capacity,) coefficient of friction, 0 across a gap that is too wide
     lam: wp.array[float],  # (capacity,) [N s]
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
     ahead: wp.array[wp.vec4],  # (capacity,) [N s]
@@ -90,8 +96,11 @@ def begin_contacts(
         if largest * body_edge[pair[c][0]] > STEEP:
             for k in range(5):
                 turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
+        mu[c] = friction
         if largest * wp.abs(g) > TURN or on_plane:
             open[c] = 0.0
+            if not on_plane:
+                mu[c] = 0.0
         if c >= first[0]:
             lam[c] = 0.0
             slip[c] = wp.vec3(0.0, 0.0, 0.0)
@@ -114,12 +123,23 @@ def next_sweep(
     done[0] = done[0] + 1
 
 
+@wp.func
+def is_quiet(
+    c: int, vert: wp.array2d[int], coef: wp.array2d[float], stirred: wp.array[int], sweep: int
+) -> bool:
+    """Whether no vertex that takes part in contact c was stirred by the sweep before."""
+    for k in range(5):
+        if takes_part(c, k, vert, coef) and stirred[vert[c, k]] == sweep - 1:
+            return False
+    return True
+
+
 @wp.kernel
 def solve_contacts(
     # in
     threads: int,
-    mu: float,
     tolerance: float,  # of an edge: approach in a step that needs another sweep
+    little: float,  # [m] a change in a step that nobody needs to know of
     sweeps: int,  # at most
     dt: wp.array[float],  # (1,) [s]
     body_edge: wp.array[float],  # (n_body,) [m]
@@ -133,20 +153,33 @@ def solve_contacts(
     closing: wp.array[float],  # (capacity,) [m/s]
     open: wp.array[float],  # (capacity,) [m]
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
+    mu: wp.array[float],  # (capacity,)
+    stirred: wp.array[int],  # (n_vert,) the last sweep if it changed the velocity
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     last: bool,  # leave the impulses where this sweep projects them
     # in, out
     lam: wp.array[float],  # (capacity,) [N s] accumulated normal impulse
     slip: wp.array[wp.vec3],  # (capacity,) [N s] accumulated friction impulse
     ahead: wp.array[wp.vec4],  # (capacity,) [N s] extrapolated friction and normal impulse, in v
+    busy: wp.array[int],  # (capacity,) 2 when this sweep changed the impulses, 1 little, 0 not
     # out
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] what this sweep adds at each vertex
+    served: wp.array[int],  # (n_vert,) this sweep where it adds something
     # out, added to
     again: wp.array[int],  # (1,) 1 when another sweep is needed
 ):
     """For each contact: update its accumulated impulses."""
+    sweep = done[0]
+    whole = last or sweep == 1
     for c in range(wp.tid(), n_contact[0], threads):
+        if not whole and busy[c] < 2 and is_quiet(c, vert, coef, stirred, sweep):
+            if busy[c] == 1:
+                busy[c] = 0
+                for k in range(5):
+                    part[5 * c + k] = wp.vec3(0.0, 0.0, 0.0)
+            continue
         if weight[c] == 0.0:
+            busy[c] = 0
             for k in range(5):
                 part[5 * c + k] = wp.vec3(0.0, 0.0, 0.0)
             continue
@@ -155,7 +188,7 @@ def solve_contacts(
         for k in range(5):
             w = v[vert[c, k]]
             u += coef[c, k] * w
-            if mu > 0.0:
+            if mu[c] > 0.0:
                 u += open[c] * wp.dot(n, w) * turn[c, k]
         un = wp.dot(u, n)
         excess = un + wp.max(closing[c], 0.0)
@@ -163,14 +196,14 @@ def solve_contacts(
         yt = wp.vec3(y[0], y[1], y[2])
         new_lam = wp.max(y[3] - excess / weight[c], 0.0)
         off = wp.abs(new_lam - y[3]) * weight[c]
-        if off * dt[0] > tolerance * body_edge[pair[c][0]] and done[0] < sweeps:
+        if off * dt[0] > tolerance * body_edge[pair[c][0]] and sweep < sweeps:
             again[0] = 1
         new_slip = wp.vec3(0.0, 0.0, 0.0)
-        if mu > 0.0:
-            new_slip = clamped(yt - (u - un * n) / weight[c], mu * new_lam)
+        if mu[c] > 0.0:
+            new_slip = clamped(yt - (u - un * n) / weight[c], mu[c] * new_lam)
         beta = float(0.0)
         if not last:
-            beta = float(done[0] - 1) / float(done[0] + 2)
+            beta = float(sweep - 1) / float(sweep + 2)
         if (y[3] - new_lam) * (new_lam - lam[c]) > 0.0:
             beta = 0.0
         next_lam = new_lam + beta * (new_lam - lam[c])
@@ -178,6 +211,8 @@ def solve_contacts(
         change = (next_lam - y[3]) * n + next_slip - yt
         for k in range(5):
             part[5 * c + k] = coef[c, k] * change + open[c] * wp.dot(turn[c, k], change) * n
+            served[vert[c, k]] = sweep
+        busy[c] = wp.where(wp.length(change) * weight[c] * dt[0] > little, 2, 1)
         ahead[c] = wp.vec4(next_slip[0], next_slip[1], next_slip[2], next_lam)
         lam[c] = new_lam
         slip[c] = new_slip
@@ -187,19 +222,29 @@ def solve_contacts(
 def apply_impulses(
     # in
     threads: int,
+    swept: bool,  # only what this sweep changed
+    little: float,  # [m] a change in a step that nobody needs to know of
+    dt: wp.array[float],  # (1,) [s]
+    done: wp.array[int],  # (1,) sweeps so far
     n_touched: wp.array[int],  # (1,)
     touched: wp.array[int],  # (n_vert,)
     start: wp.array[int],  # (n_vert + 1,)
     entry: wp.array[int],  # (5 capacity,)
     part: wp.array[wp.vec3],  # (5 capacity,) [N s]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    served: wp.array[int],  # (n_vert,)
     # in, out
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     impulse: wp.array[wp.vec3],  # (n_vert,) [N s] received since the frame began
+    # out
+    stirred: wp.array[int],  # (n_vert,) this sweep where it changed the velocity, else 0
 ):
     """For each vertex with contacts: add their impulses."""
     for k in range(wp.tid(), n_touched[0], threads):
         i = touched[k]
+        if swept and served[i] != done[0]:
+            continue
         p = total(i, start, entry, part)
         v[i] = v[i] + inv_mass[i] * p
         impulse[i] = impulse[i] + p
+        stirred[i] = wp.where(wp.length(p) * inv_mass[i] * dt[0] > little, done[0], 0)

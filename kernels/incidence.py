@@ -28,6 +28,7 @@ def total_contacts(
     # in
     hits: wp.array[int],  # (1,) vertices' contacts
     crossings: wp.array[int],  # (1,) edges' contacts, behind them
+    places: wp.array[int],  # (1,) taken by edges' contacts, with gaps between them
     capacity: int,
     # out
     n_contact: wp.array[int],  # (1,)
@@ -39,8 +40,8 @@ def total_contacts(
     n_touched[0] = 0
     n = hits[0] + crossings[0]
     n_contact[0] = wp.min(n, capacity)
-    if n > capacity:
-        wp.atomic_max(needed, 0, n)
+    if wp.max(n, places[0]) > capacity:
+        wp.atomic_max(needed, 0, wp.max(n, places[0]))
 
 
 @wp.kernel

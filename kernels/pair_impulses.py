@@ -47,8 +47,7 @@ def add_pair_impulses(
     # in
     threads: int,
     unit: float,  # momentum of one count [N s]
-    first: wp.array[int],  # (1,)
-    end: wp.array[int],  # (1,)
+    n_contact: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,)
     normal: wp.array[wp.vec3],  # (capacity,)
     lam: wp.array[float],  # (capacity,) [N s]
@@ -58,8 +57,8 @@ def add_pair_impulses(
     total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
     needed: wp.array[int],  # (1,) pairs that would have been enough
 ):
-    """For each contact: add those from the first to the end to their pairs, as integers."""
-    for c in range(first[0] + wp.tid(), wp.min(end[0], lam.shape[0]), threads):
+    """For each contact: add its impulse to its pair, as integers."""
+    for c in range(wp.tid(), n_contact[0], threads):
         p = lam[c] * normal[c] + slip[c]
         if lam[c] > 0.0 and not add(pair[c], p, unit, key, total):
             wp.atomic_max(needed, 0, key.shape[0] + 1)

@@ -1,8 +1,8 @@
 """Impulses of the last step, as a start for those of the next.
 
 What rests on something needs almost the same impulses in every step. A vertex keeps those of its
-first contact for one step, and its next contact with the same body starts from them; contacts of
-edges start from nothing.
+first contact for one step, and its next contact with the same body starts from them; for contacts
+of edges see held.py.
 """
 
 import warp as wp
@@ -22,7 +22,6 @@ def is_first(c: int, n_hit: int, vert: wp.array2d[int]) -> bool:
 def recall(
     # in
     threads: int,
-    mu: float,
     n_hit: wp.array[int],  # (1,)
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
@@ -32,27 +31,28 @@ def recall(
     weight: wp.array[float],  # (capacity,) [1/kg]
     open: wp.array[float],  # (capacity,) [m]
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
+    mu: wp.array[float],  # (capacity,)
     partner: wp.array[int],  # (n_vert,) body of the first contact in the last step, or -1
     kept: wp.array[wp.vec4],  # (n_vert,) [N s] its friction and normal impulse
-    # out
+    # in, out
     lam: wp.array[float],  # (capacity,) [N s]
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    # out
     ahead: wp.array[wp.vec4],  # (capacity,) [N s]
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] what they are at each vertex
 ):
-    """For each contact."""
+    """For each contact; those of edges have their impulses already."""
     for c in range(wp.tid(), n_contact[0], threads):
-        p = wp.vec3(0.0, 0.0, 0.0)
         n = normal[c]
         i = vert[c, 0]
         if weight[c] > 0.0 and is_first(c, n_hit[0], vert) and partner[i] == pair[c][1]:
             old = kept[i]
             rubbed = wp.vec3(old[0], old[1], old[2])
-            rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu * old[3])
+            rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu[c] * old[3])
             lam[c] = old[3]
             slip[c] = rubbed
             ahead[c] = wp.vec4(rubbed[0], rubbed[1], rubbed[2], old[3])
-            p = old[3] * n + rubbed
+        p = lam[c] * n + slip[c]
         for k in range(5):
             part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warp_contact import ContactSurface, NeoHookean, Scene, box, surface
 
@@ -152,3 +153,29 @@ def test_an_overlap_of_before_the_step_is_left_to_the_search(stages, find_contac
         np.testing.assert_allclose(down, overlap * ratio / (1.0 + ratio), atol=0.01 * overlap)
     else:
         assert np.abs(moves).max() <= surface.BOUND * model.body_edge.numpy().max() * (1.0 + 1e-3)
+
+
+def test_a_vertex_that_left_its_triangle_is_looked_at_again(rng, stages, find_contacts, jittered):
+    scene = stacked(rng, jittered, overlap=1e-5 * EDGE)
+    model, state, work = stages(scene, dt=DT)
+    c = find_contacts(model, work, state.x)
+    assert c.n > 0 and (c.coef[:, 0] == 1.0).all()
+    for way, stray in ((0.0, 0), (1.5 * EDGE, 1)):
+        x = state.x.numpy()
+        x[model.vert_body.numpy() == 1, 0] += np.float32(way)
+        moved = wp.array(x, dtype=wp.vec3)
+        surface.leftover(model, moved, work)
+        assert work.found.numpy().tolist() == [0, 0]  # no overlap is worth a move
+        surface.leftover(model, moved, work, strays=True)
+        assert work.found.numpy().tolist() == [stray, 0]
+
+
+def test_a_vertex_below_its_triangle_is_looked_at_again(rng, stages, find_contacts, jittered):
+    """Although its gap, along a direction within the triangle's plane, is closed."""
+    model, state, work = stages(stacked(rng, jittered, overlap=1e-3 * EDGE), dt=DT)
+    assert find_contacts(model, work, state.x).n > 0
+    work.contacts.normal.fill_(wp.vec3(1.0, 0.0, 0.0))
+    surface.leftover(model, state.x, work)
+    assert work.found.numpy().tolist() == [0, 0]
+    surface.leftover(model, state.x, work, strays=True)
+    assert work.found.numpy().tolist() == [1, 0]

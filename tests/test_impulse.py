@@ -139,7 +139,7 @@ def test_recorded_impulses_of_a_pair_are_its_sum(rng, stages, find_contacts, jit
     find_contacts(model, work, state.x, ahead)
     impulse.exchange(model, state.v, work)
     unit = 1e-9
-    impulse.record(model, work, unit)
+    impulse.record(work, unit)
     mass = model.mass.numpy().astype(float)[:, None]
     first = np.flatnonzero(model.vert_body.numpy() == 0)
     got = np.zeros(3)
@@ -161,3 +161,34 @@ def test_blocks_of_one_tet_fall_flat_on_a_plane(stages, find_contacts, records):
     np.testing.assert_allclose(v1[c.vert[:, 0]], 0.0, atol=1e-6)  # rounding
     above = np.setdiff1d(np.arange(8), c.vert[:, 0])
     np.testing.assert_array_equal(v1[above], [[1.0, 2.0, -3.0]] * 4)
+
+
+def test_contacts_are_left_alone_only_when_they_are_done(rng, stages, find_contacts, monkeypatch):
+    scene = Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
+    for k, speed in enumerate((0.1, 2.0)):  # blocks that come down on others, faster and slower
+        aside = rng.uniform(-0.02, 0.02, 2)
+        scene.add_body(box(0.1, 3), RUBBER, (0.3 * k, 0.0, 0.0))
+        v, place = (0.0, 0.0, -speed), (0.3 * k + aside[0], aside[1], 0.1 + 1e-5)
+        scene.add_body(box(0.1, 4), NeoHookean(1e5, 0.3, 1e4), place, velocity=v)
+    model, state, work = stages(scene, dt=DT)
+    ahead = wp.array(state.x.numpy() + DT * state.v.numpy(), dtype=wp.vec3)
+    find_contacts(model, work, state.x, ahead, edges=True)
+    c, n = work.contacts, int(work.contacts.n.numpy()[0])
+    alone = []
+
+    def watched(work, first, next_sweep=impulse.next_sweep):
+        alone.append(int((c.busy.numpy()[:n] == 0).sum()))
+        next_sweep(work, first)
+
+    monkeypatch.setattr(impulse, "next_sweep", watched)
+    monkeypatch.setattr(impulse, "SWEEPS", 1000)  # to the end
+    impulse.exchange(model, state.v, work)
+    vert, coef, normal = (a.numpy()[:n].astype(float) for a in (c.vert, c.coef, c.normal))
+    v = state.v.numpy().astype(float)[vert.astype(int)]
+    u = ((coef[:, :, None] * v).sum(axis=1) * normal).sum(axis=1)
+    approach = DT * (-u - np.maximum(c.closing.numpy()[:n], 0.0)).max()
+    edge = float(model.body_edge.numpy().min())
+    print(f"{n} contacts, alone {alone}, approach {approach / edge:.1e}")
+    assert work.done.numpy()[0] <= impulse.SWEEPS and max(alone[2:]) > n // 8
+    # The last sweep, of all contacts at once, moves the vertices that they share once more.
+    assert approach < 5.0 * impulse.TOLERANCE * edge

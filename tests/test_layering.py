@@ -13,7 +13,7 @@ SCENES = sorted((ROOT / "scenes").glob("*.py"))
 LADDER = (  # a module imports from lower rungs only
     {"kernels"},
     {"topology", "errors", "progress", "response", "types", "usd_scene", "materials"}
-    | {"pictures", "launch"},
+    | {"pictures", "launch", "warm"},
     {"mesh", "work", "forces", "usd", "checkpoint", "raycast", "diagnosis", "ready"},
     {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"}
     | {"rest", "fields", "placement"},

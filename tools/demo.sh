@@ -7,7 +7,7 @@ set -- render
 . tools/venv.sh
 
 echo "simulating 60 frames of the bowl (the first run compiles the kernels, about half a minute)"
-.venv/bin/warp-contact run bowl --frames 60 --substeps 64 --out out/bowl >/dev/null # progress: stderr
+.venv/bin/warp-contact run bowl --frames 60 --out out/bowl >/dev/null # progress: stderr
 .venv/bin/warp-contact render out/bowl --frames=-1 --quiet
 echo "USD      $PWD/out/bowl/bowl.usda"
 echo "metrics  $PWD/out/bowl/metrics.jsonl"

@@ -34,12 +34,15 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     wp.capture_if(c.stale, find)
 
 
-def track(model: Model, x: wp.array, work: Work) -> None:
-    """Let the bodies go on to ``x``, where candidates are looked at; ``n_place`` is 0 then."""
+def track(model: Model, x: wp.array, work: Work, hold: bool = False) -> None:
+    """Let the bodies go on to ``x``, where candidates are looked at.
+
+    ``n_place`` is 0 then, unless what has a place is to ``hold`` it.
+    """
     c = work.candidates
     _move(model, x, work)
     outputs = [c.motion, c.pace, c.way, work.n_place]
-    wp.launch(candidates.go_on, dim=model.n_body, inputs=[], outputs=outputs)
+    wp.launch(candidates.go_on, dim=model.n_body, inputs=[hold], outputs=outputs)
 
 
 def _move(model: Model, x: wp.array, work: Work) -> None:

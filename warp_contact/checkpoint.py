@@ -9,7 +9,7 @@ import numpy as np
 
 from warp_contact.types import Model
 
-FORMAT = 2
+FORMAT = 3
 
 
 def fingerprint(model: Model, *settings) -> str:

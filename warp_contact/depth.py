@@ -49,7 +49,7 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
         + [work.hit_layer, work.hit_depth, work.hit_dir],
         outputs=_records(work),
     )
-    _count(work, work.none)
+    _count(work, work.none, work.none)
 
 
 def edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
@@ -60,9 +60,9 @@ def edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
         work.capacity.edges,
         inputs=[c.n, c.pair, model.edges, model.vert_body, work.n_hit]
         + [work.crossing_at, work.place, work.crossing, x0],
-        outputs=_records(work),
+        outputs=[*_records(work), work.source],
     )
-    _count(work, work.n_crossing)
+    _count(work, work.n_crossing, work.n_place)
 
 
 def contacts_by_vertex(model: Model, work: Work) -> None:
@@ -87,10 +87,10 @@ def _records(work: Work) -> list[wp.array]:
     return [c.vert, c.coef, c.normal, c.depth, c.offset, c.pair]
 
 
-def _count(work: Work, crossings: wp.array) -> None:
+def _count(work: Work, crossings: wp.array, places: wp.array) -> None:
     wp.launch(
         incidence.total_contacts,
         dim=1,
-        inputs=[work.n_hit, crossings, work.capacity.contacts],
+        inputs=[work.n_hit, crossings, places, work.capacity.contacts],
         outputs=[work.contacts.n, work.contacts.n_touched, work.contacts.needed[0:1]],
     )

@@ -3,7 +3,7 @@
 import warp as wp
 
 from warp_contact import candidates
-from warp_contact.kernels import crossing, hits
+from warp_contact.kernels import crossing, held, hits
 from warp_contact.launch import launch_over
 from warp_contact.types import Model
 from warp_contact.work import Work
@@ -29,19 +29,37 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
     )
 
 
-def find_crossings(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
+def find_crossings(
+    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, hold: bool = False
+) -> None:
     """Set ``crossing_at``, ``place`` and ``crossing``: edges across a body at ``x``.
 
-    The step begins at ``x0``; ``fresh``: no overlap is older than that.
+    The step begins at ``x0``; ``fresh``: no overlap is older than that. ``hold``: add to what is
+    there.
     """
-    candidates.track(model, x, work)
+    candidates.track(model, x, work, hold)
     c = work.candidates.edges
     launch_over(
         crossing.find_crossings,
         work.capacity.edges,
-        inputs=[fresh, work.candidates.skin, c.n, c.pair, c.items, c.item, work.surface.id]
+        inputs=[hold, fresh, work.candidates.skin, c.n, c.pair, c.items, c.item, work.surface.id]
         + [model.tris, model.edges, model.vert_body, model.body_edge]
         + [work.candidates.pace, work.candidates.way, x0, x],
-        outputs=[c.wake, work.crossing_at, work.place, work.crossing, work.n_place],
+        outputs=[c.wake, work.place, work.crossing, work.crossing_at, work.n_place],
+    )
+    wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)
+
+
+def hold_crossings(model: Model, x0: wp.array, work: Work) -> None:
+    """Set ``crossing_at``, ``place`` and ``crossing``: contacts of edges that go on."""
+    c = work.candidates.edges
+    work.place.fill_(-1)
+    work.crossing_at.zero_()
+    launch_over(
+        held.hold,
+        work.capacity.contacts,
+        inputs=[work.candidates.edge, work.warm.n_held, work.warm.held, c.start, c.pair]
+        + [model.edges, model.tris, x0],
+        outputs=[work.crossing_at, work.place, work.crossing, work.n_place],
     )
     wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)

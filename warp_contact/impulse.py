@@ -2,14 +2,15 @@
 
 import warp as wp
 
-from warp_contact.kernels import impulse, pair_impulses, penalty, predicted, warm
+from warp_contact.kernels import held, impulse, pair_impulses, penalty, predicted, warm
 from warp_contact.launch import launch_over
 from warp_contact.response import Penalty
 from warp_contact.types import Model
 from warp_contact.work import Work
 
-SWEEPS = 12  # of the impulses, at most: they go on from those of the last step
+SWEEPS = 48  # of the impulses, at most; few clusters of contacts last so long
 TOLERANCE = 1e-5  # of an edge: an approach in one step that is left to the closure
+QUIET = 0.1  # of the tolerance, at the shortest edge: a change that nobody needs to know of
 
 
 def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
@@ -18,34 +19,57 @@ def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
     launch_over(
         impulse.begin_contacts,
         work.capacity.contacts,
-        inputs=[first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
+        inputs=[model.friction, first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
         + [model.inv_mass, model.body_edge, work.dt, x0],
-        outputs=[c.weight, c.closing, c.open, c.turn, c.lam, c.slip, c.ahead],
+        outputs=[c.weight, c.closing, c.open, c.turn, c.mu, c.lam, c.slip, c.ahead],
     )
 
 
 def recall(model: Model, v: wp.array, work: Work) -> None:
-    """Start the contacts of vertices, and ``v``, from the impulses of the last step."""
+    """Start the contacts, and ``v``, from the impulses of the last step."""
     c = work.contacts
+    recall_edges(work)
     launch_over(
         warm.recall,
         work.capacity.contacts,
-        inputs=[model.friction, work.n_hit, c.n, c.vert, c.coef, c.normal, c.pair, c.weight]
-        + [c.open, c.turn, work.partner, work.kept],
+        inputs=[work.n_hit, c.n, c.vert, c.coef, c.normal, c.pair, c.weight]
+        + [c.open, c.turn, c.mu, work.warm.partner, work.warm.kept],
         outputs=[c.lam, c.slip, c.ahead, c.part],
     )
     _apply(model, v, work)
 
 
+def recall_edges(work: Work) -> None:
+    """Let the contacts of edges go on from the impulses that they have."""
+    c = work.contacts
+    launch_over(
+        held.recall,
+        work.capacity.contacts,
+        inputs=[work.n_hit, c.n, c.normal, c.weight, c.mu, work.source, work.crossing],
+        outputs=[c.lam, c.slip, c.ahead],
+    )
+
+
 def keep(work: Work) -> None:
     """Keep the impulses of the vertices for the next step."""
     c = work.contacts
-    work.partner.fill_(-1)
+    work.warm.partner.fill_(-1)
     launch_over(
         warm.keep,
         work.capacity.contacts,
         inputs=[work.n_hit, c.vert, c.pair, c.lam, c.slip],
-        outputs=[work.partner, work.kept],
+        outputs=[work.warm.partner, work.warm.kept],
+    )
+
+
+def keep_edges(work: Work) -> None:
+    """Keep the impulses of the edges, and their contacts for the next step."""
+    c = work.contacts
+    launch_over(
+        held.keep,
+        work.capacity.contacts,
+        inputs=[work.n_hit, c.n, work.source, c.lam, c.slip],
+        outputs=[work.crossing, work.warm.held, work.warm.n_held],
     )
 
 
@@ -54,7 +78,13 @@ def forget(work: Work) -> None:
     work.n_hit.zero_()
     work.n_crossing.zero_()
     work.contacts.n.zero_()
-    work.partner.fill_(-1)
+    work.warm.partner.fill_(-1)
+    forget_edges(work)
+
+
+def forget_edges(work: Work) -> None:
+    """There are no contacts of edges for the next step to go on with."""
+    work.warm.n_held.zero_()
 
 
 def exchange(model: Model, v: wp.array, work: Work) -> None:
@@ -66,12 +96,12 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
         launch_over(
             impulse.solve_contacts,
             work.capacity.contacts,
-            inputs=[model.friction, TOLERANCE, SWEEPS, work.dt, model.body_edge, c.pair, work.done]
+            inputs=[TOLERANCE, _little(work), SWEEPS, work.dt, model.body_edge, c.pair, work.done]
             + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.open, c.turn]
-            + [v, last],
-            outputs=[c.lam, c.slip, c.ahead, c.part, work.again],
+            + [c.mu, work.stirred, v, last],
+            outputs=[c.lam, c.slip, c.ahead, c.busy, c.part, work.served, work.again],
         )
-        _apply(model, v, work)
+        _apply(model, v, work, swept=True)
 
     sweep(first=True)
     wp.capture_while(work.again, sweep)
@@ -109,36 +139,28 @@ def push_apart(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
     _apply(model, v, work)
 
 
-def record(model: Model, work: Work, unit: float) -> None:
+def record(work: Work, unit: float) -> None:
     """Add the impulses of all contacts to their pairs of bodies, in counts of ``unit`` [N s]."""
-    _record(work, unit, work.none, work.contacts.n)
-
-
-def record_vertices(work: Work, unit: float) -> None:
-    """As ``record``, of the contacts of vertices only."""
-    _record(work, unit, work.none, work.n_hit)
-
-
-def record_edges(work: Work, unit: float) -> None:
-    """As ``record``, of the contacts of edges only."""
-    _record(work, unit, work.n_hit, work.contacts.n)
-
-
-def _record(work: Work, unit: float, first: wp.array, end: wp.array) -> None:
     c = work.contacts
     launch_over(
         pair_impulses.add_pair_impulses,
         work.capacity.contacts,
-        inputs=[unit, first, end, c.pair, c.normal, c.lam, c.slip],
+        inputs=[unit, c.n, c.pair, c.normal, c.lam, c.slip],
         outputs=[work.pair_key, work.pair_total, c.needed[1:2]],
     )
 
 
-def _apply(model: Model, v: wp.array, work: Work) -> None:
+def _apply(model: Model, v: wp.array, work: Work, swept: bool = False) -> None:
+    """Add the parts of the contacts to ``v``; ``swept``: only what the last sweep changed."""
     c = work.contacts
     launch_over(
         impulse.apply_impulses,
         model.n_vert,
-        inputs=[c.n_touched, c.touched, c.start, c.entry, c.part, model.inv_mass],
-        outputs=[v, work.impulse],
+        inputs=[swept, _little(work), work.dt, work.done]
+        + [c.n_touched, c.touched, c.start, c.entry, c.part, model.inv_mass, work.served],
+        outputs=[v, work.impulse, work.stirred],
     )
+
+
+def _little(work: Work) -> float:
+    return QUIET * TOLERANCE * work.candidates.edge

@@ -29,13 +29,14 @@ class Pace:
         self.wanted = wanted
         self._model = model
         self._response = response
+        self._leaves = not isinstance(response, ContactSurface) or response.search == "literal"
         self._thickness = float(model.body_thickness.numpy().min())
         self._edge = float(model.body_edge.numpy().min())
         of_bodies = np.unique(model.body_world.numpy(), return_inverse=True)[1]
         self._world = of_bodies[model.vert_body.numpy()]
         self._largest_inv_mass = float(model.inv_mass.numpy().max())
 
-    def steps(self, state: State, omega: float, last: int, frame: int) -> int:
+    def steps(self, state: State, omega: float, last: int, frame: int, search: bool) -> int:
         """Steps of frame number ``frame``, after one of ``last`` steps.
 
         Args:
@@ -43,6 +44,7 @@ class Pace:
             omega: largest frequency of the elastic forces [1/s]
             last: steps of the frame before
             frame: its number, for the message
+            search: whether there may be overlaps that no step created
 
         Raises:
             SimulationError: no step is stable
@@ -53,7 +55,8 @@ class Pace:
             tet = flattest_tet(self._model, state.x)
             raise SimulationError(f"frame {frame}: {tet} is too flat: no step is stable")
         omega, speed = self._with_response(omega), self._speed(state)
-        per_second = substeps.steps_per_second(omega, speed, self._thickness, self._edge)
+        sizes = self._thickness, self._edge
+        per_second = substeps.steps_per_second(omega, speed, *sizes, search or self._leaves)
         return substeps.steps_in_frame(per_second, self.fps, last)
 
     def check(self, state: State, omega: float, frame: int) -> None:

@@ -8,6 +8,7 @@ from warp_contact.kernels import (
     closure,
     crossing,
     hashing,
+    held,
     hits,
     impulse,
     incidence,
@@ -25,8 +26,8 @@ from warp_contact.types import Model
 
 # What a frame of any scene uses. The search for overlaps at the start, other responses, sleep and
 # measuring are left out: many scenes do without.
-ALWAYS = (bounds, candidates, closure, crossing, hashing, hits, impulse, incidence, lanczos, motion)
-ALWAYS += (near, pair_impulses, pairs, penetration, shape, vertex_contact, warm)
+ALWAYS = (bounds, candidates, closure, crossing, hashing, held, hits, impulse, incidence)
+ALWAYS += (lanczos, motion, near, pair_impulses, pairs, penetration, shape, vertex_contact, warm)
 
 
 def load_kernels(model: Model, device: wp.Device) -> None:

@@ -8,7 +8,7 @@ from dataclasses import astuple, replace
 import numpy as np
 import warp as wp
 
-from warp_contact import checkpoint, solver
+from warp_contact import checkpoint, solver, warm
 from warp_contact.assemble import assemble
 from warp_contact.diagnosis import lost_vertex, vertex_name
 from warp_contact.errors import SimulationError
@@ -92,6 +92,7 @@ class Simulation:
             pairs = max(Capacity.pairs, NEIGHBOURS * self.model.n_body)
             self._work: Work = self._allocate(self.state, Capacity(pairs=pairs))
             self._saved = State(wp.clone(self.state.x), wp.clone(self.state.v))
+            self._saved_warm = warm.allocate(self.model.n_vert, self._work.capacity.contacts)
         inv_mass = self.model.inv_mass.numpy()
         mobile = float(self.model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
         self._unit = UNIT * (mobile if mobile > 0.0 else 1.0)
@@ -136,6 +137,7 @@ class Simulation:
                     return
             wp.copy(self._saved.x, self.state.x)
             wp.copy(self._saved.v, self.state.v)
+            warm.copy(self._saved_warm, self._work.warm)
             while self._search is None or self._grow():
                 self._search = solver.overlaps(self.model, self.state, self._work)
             omega, rate = self._rates or self._spectrum.rates(self.state.x)
@@ -209,7 +211,8 @@ class Simulation:
         """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
 
         The partner is a body's index, n_body + p for plane p, -1 for none; it and the penetration
-        are those of the last step, found at its predicted positions. Shapes (n_vert,).
+        are those of the last step, found at its predicted positions; contacts of edges that go on
+        from the step before have no penetration. Shapes (n_vert,).
         """
         return contact_fields(self.model, self.state.x, self._work, 1.0 / self.fps)
 
@@ -224,6 +227,7 @@ class Simulation:
             values |= {"frame": np.array(self.frame), "substeps": np.array(self.substeps)}
             values |= {f"start.{k}": start for k, start in self._spectrum.starts().items()}
             values |= {f"meter.{k}": value for k, value in self._meter.memory().items()}
+            values |= {f"warm.{k}": value for k, value in warm.values(self._work.warm).items()}
             if self._rest:
                 rest = self._rest.values(self._work)
                 values |= {f"rest.{k}": value for k, value in rest.items()}
@@ -248,10 +252,12 @@ class Simulation:
             self._meter = Meter(self.model)
             self._meter.remember(checkpoint.part(values, "meter"))
             rest = checkpoint.part(values, "rest")
-            room = len(rest.get("pair_key", ()))
-            capacity = self._work.capacity
-            capacity = replace(capacity, pairs=max(capacity.pairs, room))
-            self._replace_work(capacity)
+            impulses = checkpoint.part(values, "warm")
+            have = self._work.capacity
+            pairs = max(have.pairs, len(rest.get("pair_key", ())))
+            contacts = max(have.contacts, len(impulses["held"]))
+            self._replace_work(replace(have, pairs=pairs, contacts=contacts))
+            warm.restore(self._work.warm, impulses)
             if self._rest:
                 self._rest.restore(rest, self._work)
         self.frame, self.substeps = int(values["frame"]), int(values["substeps"])
@@ -273,14 +279,13 @@ class Simulation:
             work.impulse.zero_()
             work.pair_key.fill_(-1)
             work.pair_total.zero_()
-        n = self._pace.steps(self.state, omega, last, self.frame + 1)
+        n = self._pace.steps(self.state, omega, last, self.frame + 1, bool(self._search))
         dt = 1.0 / (self.fps * n)
         stages = stages_for(rate, dt)
         if self._dt is not None and dt != self._dt:
             work.dt.fill_(0.5 * (self._dt - dt))
             solver.kick(self.model, self.state, work)  # velocities lag by half a step
         work.dt.fill_(dt)
-        work.partner.fill_(-1)  # a frame depends on nothing but the state before it
         work.contacts.needed.zero_()
         work.deep_found.zero_()
         work.bodies.rebuild()
@@ -326,13 +331,19 @@ class Simulation:
         del self._work
         try:
             self._work = self._allocate(self.state, capacity)
+            saved = warm.allocate(self.model.n_vert, capacity.contacts)
         except RuntimeError:  # there is no memory for it
             self._work = self._allocate(self.state, before)
+            warm.copy(self._work.warm, self._saved_warm)
             raise
+        warm.copy(saved, self._saved_warm)
+        warm.copy(self._work.warm, saved)
+        self._saved_warm = saved
 
     def _restore(self) -> None:
         wp.copy(self.state.x, self._saved.x)
         wp.copy(self.state.v, self._saved.v)
+        warm.copy(self._work.warm, self._saved_warm)
 
     def _range(self, body: Body | int | None) -> slice:
         if body is None:

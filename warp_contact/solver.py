@@ -11,8 +11,6 @@ from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.types import Model, State
 from warp_contact.work import Work
 
-LOOKS = 3  # after the closure at the edges again, first at the vertices too; a closure after each
-
 
 def step(
     model: Model,
@@ -30,39 +28,30 @@ def step(
     the resolution of the recorded contact impulses.
     """
     c = work.contacts
-    exchange = partial(impulse.exchange, model, state.v, work)
+
+    def exchange() -> None:
+        impulse.exchange(model, state.v, work)
+        impulse.keep_edges(work)
 
     def begin() -> None:
         impulse.recall(model, state.v, work)
         exchange()
 
-    def exchange_edges() -> None:
-        exchange()
-        impulse.record_edges(work, unit)
-
-    def look_again() -> None:
-        edge_contacts(model, state.x, state.x, work, not search)
-
-    def exchange_twice() -> None:
-        exchange_edges()
+    def touch() -> None:
+        vertex_contacts(model, state.x, work.x, work, not search)
+        hold_edges(model, state.x, work, search)
+        wp.capture_if(c.n, begin, lambda: impulse.forget_edges(work))
         # The impulses may have led other edges across each other. Were these left to the closure,
         # they would go on to approach, and what it displaces would gain energy.
         drift(model, state, work, work.x)
-        edge_contacts(model, state.x, work.x, work, True)
+        edge_contacts(model, state.x, work.x, work, not search, hold=True)
         surface.leftover(model, work.x, work)
-        wp.capture_if(work.found[0:1], exchange_edges)
-
-    def touch() -> None:
-        vertex_contacts(model, state.x, work.x, work, not search)
-        wp.capture_if(c.n, begin)
-        drift(model, state, work, work.x)
-        edge_contacts(model, state.x, work.x, work, not search)
-        wp.capture_if(work.n_crossing, exchange_edges if search else exchange_twice)
+        wp.capture_if(work.found[0:1], exchange)
         impulse.keep(work)
-        impulse.record_vertices(work, unit)
+        impulse.record(work, unit)
         drift(model, state, work, state.x)
-        # The impulses moved what was looked at.
-        wp.capture_if(work.n_crossing if search else work.found[0:1], look_again)
+        # Where impulses were exchanged once more, ``found`` says so still: edges may have moved on.
+        surface.leftover(model, state.x, work, strays=not search, more=True)
         move_surfaces(model, state, work, response, search)  # what the step did not create
 
     def fly() -> None:
@@ -76,7 +65,7 @@ def step(
         edge_contacts(model, state.x, state.x, work, False)
         predict(model, state, work, stages)
         wp.capture_if(c.n, lambda: impulse.push(model, state.v, work, response))
-        impulse.record(model, work, unit)
+        impulse.record(work, unit)
         drift(model, state, work, state.x)
     elif isinstance(response, PredictedForce):
         predict(model, state, work, stages)
@@ -84,16 +73,17 @@ def step(
         vertex_contacts(model, state.x, work.x, work, False)  # overlaps may last some steps
         edge_contacts(model, state.x, work.x, work, False)
         wp.capture_if(c.n, lambda: impulse.push_apart(model, work.x, state.v, work))
-        impulse.record(model, work, unit)
+        impulse.record(work, unit)
         drift(model, state, work, state.x)
     elif response.search == "literal":
         predict(model, state, work, stages)
         candidates.refresh(model, state.x, work.x, work)
         wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
         vertex_contacts(model, state.x, state.x, work, False)
+        surface.leftover(model, state.x, work)
         move_surfaces(model, state, work, response, search)
-        wp.capture_if(c.n, exchange)
-        impulse.record(model, work, unit)
+        wp.capture_if(c.n, lambda: impulse.exchange(model, state.v, work))
+        impulse.record(work, unit)
     else:
         predict(model, state, work, stages)
         candidates.refresh(model, state.x, work.x, work)
@@ -172,24 +162,58 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
     wp.capture_if(work.candidates.verts.n, find, none)
 
 
-def edge_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Stages 1 and 2: contacts of edges across other bodies at ``x``; ``found`` is 0 without."""
-    look = partial(detect.find_crossings, model, x0, x, work, fresh)
+def edge_contacts(
+    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, hold: bool = False
+) -> None:
+    """Stages 1 and 2: contacts of edges across other bodies at ``x``.
+
+    ``hold``: those that the step has already stay, with their impulses.
+    """
+    look = partial(detect.find_crossings, model, x0, x, work, fresh, hold)
     wp.capture_if(work.candidates.edges.n, look, work.n_crossing.zero_)
 
     def append() -> None:
-        depth.edge_contacts(model, x0, work)
-        depth.contacts_by_vertex(model, work)
-        impulse.begin(model, x0, work, work.n_hit)
+        append_edges(model, x0, work)
+        if hold:
+            impulse.recall_edges(work)
 
-    wp.capture_if(work.n_crossing, append, work.found.zero_)
+    wp.capture_if(work.n_crossing, append)
+
+
+def append_edges(model: Model, x0: wp.array, work: Work) -> None:
+    """Make contacts of the crossings, behind those of the vertices."""
+    depth.edge_contacts(model, x0, work)
+    depth.contacts_by_vertex(model, work)
+    impulse.begin(model, x0, work, work.n_hit)
+
+
+def hold_edges(model: Model, x0: wp.array, work: Work, search: bool) -> None:
+    """Let the contacts of edges go on that pressed in the last step; this one begins at ``x0``.
+
+    With ``search`` none does: what is moved apart there is not what the impulses held.
+    """
+
+    def hold() -> None:
+        detect.hold_crossings(model, x0, work)
+        wp.capture_if(work.n_crossing, partial(append_edges, model, x0, work))
+
+    def none() -> None:
+        work.place.fill_(-1)
+        work.n_place.zero_()
+
+    if search:
+        none()
+    else:
+        wp.capture_if(work.warm.n_held, hold, none)
 
 
 def move_surfaces(
     model: Model, state: State, work: Work, response: ContactSurface, search: bool
 ) -> None:
-    """Stages 3 and 4: displace the surfaces onto a common one; no motion comes of it."""
-    surface.leftover(model, state.x, work)
+    """Stages 3 and 4: displace the surfaces onto a common one, after ``surface.leftover``.
+
+    No motion comes of it.
+    """
 
     def find_surface() -> None:
         surface.begin_search(model, state.x, work)
@@ -198,20 +222,18 @@ def move_surfaces(
         else:
             surface.balance(model, state.x, work, response)
 
-    def close(looks: int = LOOKS) -> None:
+    def close() -> None:
         surface.close(model, state.x, state.v, work, search)
-        # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
-        # may cross that it could not see.
-        if looks == LOOKS:
-            vertex_contacts(model, state.x, state.x, work, not search)
-        if looks > 0:
-            edge_contacts(model, state.x, state.x, work, not search)
-            surface.leftover(model, state.x, work)
-            wp.capture_if(work.found[0:1], partial(close, looks - 1))
 
     def resolve() -> None:
         if search:
             wp.capture_if(work.found[1:2], find_surface)
         close()
+        # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
+        # may cross that it could not see.
+        vertex_contacts(model, state.x, state.x, work, not search)
+        edge_contacts(model, state.x, state.x, work, not search)
+        surface.leftover(model, state.x, work)
+        wp.capture_if(work.found[0:1], close)
 
     wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else resolve)

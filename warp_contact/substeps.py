@@ -2,13 +2,14 @@
 
     stable  = omega / (2 SAFETY)                     [1/s]  2 / omega is the longest stable step
     passing = u / (REACH t)                          [1/s]  nothing jumps through a body
-    clean   = min(u / (TRAVEL e), PATIENCE stable)   [1/s]  an impact without a trace of overlap
-    n       = max(ceil(max(stable, passing, clean) / fps), floor(KEEP n_last), 1)
+    gentle  = min(u / (TRAVEL e), PATIENCE stable)   [1/s]  an impact does not crush a tet at once
+    n       = max(ceil(max(stable, passing, gentle) / fps), floor(KEEP n_last), 1)
 
 omega is the largest frequency of the elastic forces [1/s], u the largest relative speed [m/s], t
 the thickness of the thinnest body [m] and e the shortest mean edge of a body [m]. They are those at
-the start of the frame. At its end the step must still be below ``UNSTABLE`` / omega, and damped in
-as many stages as it then needs; a frame that fails is repeated at the rates of its end.
+the start of the frame. While there may be overlaps from before, LINGERING stands for TRAVEL. At its
+end the step must still be below ``UNSTABLE`` / omega, and damped in as many stages as it then
+needs; a frame that fails is repeated at the rates of its end.
 """
 
 import math
@@ -20,8 +21,9 @@ UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repe
 UNSTABLE_DAMPED = 1.4  # the same with damping, see kernels/motion.py
 RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
-TRAVEL = 0.025  # of the shortest mean edge: the same, for an impact without a trace of overlap
-PATIENCE = 2.0  # stable steps, at most, that such an impact is worth
+TRAVEL = 0.1  # of the shortest mean edge: the same, for the tets where something strikes
+LINGERING = 0.025  # as TRAVEL, where overlaps may last some steps
+PATIENCE = 2.0  # stable steps, at most, that both are worth
 BLURRED = 1.05  # times the stable step: how well that is known
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 let some pass
 KEEP = (
@@ -29,19 +31,23 @@ KEEP = (
 )
 
 
-def steps_per_second(omega: float, speed: float, thickness: float, edge: float) -> float:
-    """Steps [1/s] that are stable, and short against the thinnest body and for an impact.
+def steps_per_second(
+    omega: float, speed: float, thickness: float, edge: float, overlaps: bool
+) -> float:
+    """Steps [1/s] that are stable, and short against the thinnest body and the edges.
 
     Args:
         omega: largest frequency [1/s]
         speed: largest relative speed [m/s]
         thickness: of the thinnest body [m]
         edge: shortest mean edge of a body [m]
+        overlaps: whether some may last: of the start, or such that the response leaves
     """
     stable = omega / (2.0 * SAFETY)
     passing = speed / (REACH * thickness)
-    clean = min(speed / (TRAVEL * edge), PATIENCE * stable)
-    return max(stable, passing, clean)
+    travel = LINGERING if overlaps else TRAVEL
+    gentle = min(speed / (travel * edge), PATIENCE * stable)
+    return max(stable, passing, gentle)
 
 
 def steps_in_frame(per_second: float, fps: float, last: int) -> int:

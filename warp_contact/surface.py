@@ -18,14 +18,21 @@ BOUND = 0.02  # of an edge: the largest move in a step; more would invert a body
 PASSES = 32  # of the closure, at most
 
 
-def leftover(model: Model, x: wp.array, work: Work) -> None:
-    """Set ``contacts.left`` at ``x``, and ``found``: what stage 4 has to do."""
+def leftover(
+    model: Model, x: wp.array, work: Work, strays: bool = False, more: bool = False
+) -> None:
+    """Set ``contacts.left`` at ``x``, and ``found``: what stage 4 has to do.
+
+    ``strays``: also where a vertex left the triangle of its contact, or lies below it. ``more``: in
+    addition to what is ``found`` already.
+    """
     c = work.contacts
-    work.found.zero_()
+    if not more:
+        work.found.zero_()
     launch_over(
         closure.leftover,
         work.capacity.contacts,
-        inputs=[TOLERANCE, DEEP, c.n, c.vert, c.coef, c.normal, c.offset, c.pair]
+        inputs=[TOLERANCE, DEEP, strays, c.n, c.vert, c.coef, c.normal, c.offset, c.pair]
         + [model.body_edge, c.closing, work.dt, x],
         outputs=[c.left, work.found, work.deep_found],
     )

@@ -222,7 +222,7 @@ class Contacts:
         vert: vertices, shape (capacity, 5)
         coef: signed weights, shape (capacity, 5)
         normal: unit direction, shape (capacity,)
-        depth: at detection [m], shape (capacity,)
+        depth: at detection [m], 0 of edges that go on, shape (capacity,)
         offset: of a plane, else 0 [m], shape (capacity,)
         pair: the two bodies, n_body + p for plane p, shape (capacity,)
         start: first entry of each vertex in ``entry``, shape (n_vert + 1,)
@@ -237,6 +237,9 @@ class Contacts:
         lam: normal impulse of the step [N s], shape (capacity,)
         slip: friction impulse of the step [N s], shape (capacity,)
         ahead: extrapolated friction and normal impulse [N s], shape (capacity,)
+        mu: coefficient of friction, 0 across a wide gap, shape (capacity,)
+        busy: 2 where the last sweep changed the impulses, 1 a little, 0 where it left them alone,
+            shape (capacity,)
         part: what the last sweep adds at each vertex [N s], shape (5 capacity,)
         left: overlap after the impulses [m], shape (capacity,)
         slack: part of it that later steps resolve [m], shape (capacity,)
@@ -262,6 +265,8 @@ class Contacts:
     lam: wp.array
     slip: wp.array
     ahead: wp.array
+    mu: wp.array
+    busy: wp.array
     part: wp.array
     left: wp.array
     slack: wp.array

@@ -8,11 +8,12 @@ from warp_contact.kernels import bounds
 from warp_contact.kernels.edge_contact import EdgeContact
 from warp_contact.kernels.near import MANY, Near
 from warp_contact.types import Awake, Candidates, Capacity, Contacts, Model, Pairs, State
+from warp_contact.warm import Warm, allocate
 
 
 @dataclass
 class Work:
-    """Arrays that a step fills and forgets; but for the impulses of bodies asleep, see rest.py.
+    """Arrays that a step fills and forgets; but for ``warm``, and what rest.py says of sleepers.
 
     Attributes:
         capacity: what there is room for
@@ -35,8 +36,11 @@ class Work:
         hit_at: hits before each candidate vertex, shape (capacity.verts + 1,)
         hit_vert, hit_body, hit_layer, hit_depth, hit_dir: the hits, shape (capacity.contacts,)
         crossing: contacts of candidate edges in any order, shape (capacity.contacts,)
-        n_place: how many there are, shape (1,)
-        place: that of each candidate edge among them, shape (capacity.edges,)
+        n_place: places taken, some of them no longer in use, shape (1,)
+        place: that of the first of each candidate edge, shape (capacity.edges,)
+        source: place of each contact of an edge, shape (capacity.contacts,)
+        stirred, served: the last sweep that changed the velocity of a vertex, and that added
+            anything to it, shape (n_vert,)
         crossing_at: contacts before each candidate edge, shape (capacity.edges + 1,)
         layer: layer of the propagation, shape (1,)
         pending: whether it goes on, shape (1,)
@@ -53,8 +57,7 @@ class Work:
         stiffness: traction gained over the whole of s [Pa], shape (n_vert,)
         fraction: part of s, shape (n_vert,)
         upper_mean, lower_mean: both sides of each contact, shape (capacity.contacts,)
-        partner: body of each vertex' first contact in the last step, -1 for none, shape (n_vert,)
-        kept: friction and normal impulse of that contact [N s], shape (n_vert,)
+        warm: the impulses of the last step
         impulse: received by each vertex since the frame began [N s], shape (n_vert,)
         pair_key: bodies of a pair with a contact force, shape (capacity.pairs,)
         pair_total: its impulse since the frame began, in units, shape (capacity.pairs, 3)
@@ -88,6 +91,9 @@ class Work:
     crossing: wp.array
     n_place: wp.array
     place: wp.array
+    source: wp.array
+    stirred: wp.array
+    served: wp.array
     crossing_at: wp.array
     layer: wp.array
     pending: wp.array
@@ -107,8 +113,7 @@ class Work:
     fraction: wp.array
     upper_mean: wp.array
     lower_mean: wp.array
-    partner: wp.array
-    kept: wp.array
+    warm: Warm
     impulse: wp.array
     pair_key: wp.array
     pair_total: wp.array
@@ -166,6 +171,9 @@ def allocate_work(
         crossing=wp.zeros(m, dtype=EdgeContact),
         n_place=_ints(1),
         place=_ints(capacity.edges),
+        source=_ints(m),
+        stirred=_ints(n),
+        served=_ints(n),
         crossing_at=crossing_at,
         layer=_ints(1),
         pending=_ints(1),
@@ -185,8 +193,7 @@ def allocate_work(
         fraction=_floats(n),
         upper_mean=_vectors(m),
         lower_mean=_vectors(m),
-        partner=wp.full(n, -1, dtype=int),
-        kept=wp.zeros(n, dtype=wp.vec4),
+        warm=allocate(n, m),
         impulse=_vectors(n),
         pair_key=wp.full(capacity.pairs, -1, dtype=wp.int64),
         pair_total=wp.zeros((capacity.pairs, 3), dtype=wp.int64),
@@ -293,7 +300,9 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         lam=_floats(m),
         slip=_vectors(m),
         ahead=wp.zeros(m, dtype=wp.vec4),
+        mu=_floats(m),
         part=_vectors(5 * m),
+        busy=_ints(m),
         left=_floats(m),
         slack=_floats(m),
         push=_floats(m),

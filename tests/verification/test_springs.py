@@ -20,10 +20,7 @@ def test_the_closed_form_meets_published_numbers():
 @pytest.mark.parametrize("name", springs.CASES)
 def test_columns_share_their_overlap_like_springs(name, across, mesh, turned, ask, hold):
     figures = springs.press(name, springs.CASES[name], ask, across, mesh, Pose(turned))
-    # The resting gap, 1e-3 of an edge of a cell, is 0.15 % of an overlap of 0.1, and more of the
-    # smaller overlaps of these two: target excellent (0.5 %), reached 0.7 % and 1.4 %.
-    small = name in ("gravity", "unequal lengths")
-    hold(figures, "good" if small else "excellent")
+    hold(figures, "excellent")
 
 
 def test_the_pressure_does_not_depend_on_the_damping_of_the_material(ask, hold):

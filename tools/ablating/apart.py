@@ -26,10 +26,10 @@ def vibrating() -> dict[str, float]:
 
 
 def pulled() -> dict[str, float]:
-    """Springs pulled to 2.5 lengths."""
+    """Springs pulled to five lengths."""
     scene, mesh = wc.Scene(gravity=(0.0, 0.0, 0.0)), wc.box(0.1, 3)
     top, bottom = (on_face(mesh, 2, side) for side in (1, -1))
-    v = np.where(top[:, None], (0.0, 0.0, 1.5), 0.0)
+    v = np.where(top[:, None], (0.0, 0.0, 2.0), 0.0)
     springs_only = wc.SpringNetwork(1.0, 1.0, 1.0, 1000.0)
     scene.add_body(mesh, springs_only, velocity=v, fixed=top | bottom)
     sim = wc.Simulation(scene, fps=10)

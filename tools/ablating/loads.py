@@ -1,11 +1,14 @@
 """Cases in which bodies press on each other."""
 
 from collections.abc import Callable
+from functools import partial
 from unittest import mock
 
 import warp as wp
 from checks import surface as stage_4
-from verification import ladder, springs
+from stable import ratios, sweeps
+from stable.setup import attempt
+from verification import springs
 from verification import weight as static
 from verification.setup import Ask, Pose
 
@@ -14,9 +17,10 @@ from warp_contact import impulse
 from warp_contact.kernels import impulse as impulse_kernels
 
 INSERTED = "energy that it puts in [J]"
+RISE = "energy gained [of that stored]"
+GAINED = "energy gained [of that at the start]"
 PLACE = "place of the surface [% of the overlap]"
 PRESSED = "contact force [of the exact one]"
-CARRIED = "mean force [of the weight]"
 SWEEPS = "sweeps of the impulses in a step"
 
 
@@ -37,6 +41,12 @@ def deep() -> dict[str, float]:
     return {INSERTED: max(sim.measure().energy for _ in sim.frames(20))}
 
 
+def inserted() -> dict[str, float]:
+    """A block that starts 0.3 edges inside one 0.4 edges thick."""
+    build = partial(sweeps.SWEEPS["depth"].build, 0.3, 0.4)
+    return {RISE: max(attempt(build, most_steps=1500).gained, 0.0)}
+
+
 def columns() -> dict[str, float]:
     """A1 columns, damped, at rest."""
     pressed = springs.press(
@@ -45,9 +55,10 @@ def columns() -> dict[str, float]:
     return {PRESSED: abs(next(pressed).error)}
 
 
-def heavy() -> dict[str, float]:
-    """A7m heavy on light, mass ratio 100."""
-    return {CARRIED: abs(next(ladder.carry(Ask(), 100.0)).error)}
+def dense() -> dict[str, float]:
+    """Cube on a cube of a 10000th of its density."""
+    case = next(c for c in ratios.cases(False) if "1:10000, heavy" in c.name)
+    return {GAINED: max(attempt(case.build, "surface", limit=case.limit).gained, 0.0)}
 
 
 def sheet() -> dict[str, float]:
@@ -64,7 +75,7 @@ def sheet() -> dict[str, float]:
     with (
         mock.patch.multiple(static, SETTLE=0.3, SAMPLE=0.1),
         mock.patch.object(impulse, "next_sweep", counting(impulse.next_sweep, sweeps)),
-        mock.patch.object(impulse, "record_vertices", counting(impulse.record_vertices, steps)),
+        mock.patch.object(impulse, "record", counting(impulse.record, steps)),
     ):
         list(static.on_sheet("", Ask()))
     return {SWEEPS: float(sweeps.numpy()[0] / steps.numpy()[0])}

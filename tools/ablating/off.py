@@ -25,7 +25,7 @@ def nothing(*args) -> None:
     """In the place of a stage."""
 
 
-def no_crossings(model, x0, x, work, fresh) -> None:
+def no_crossings(model, x0, x, work, fresh, hold=False) -> None:
     """In the place of ``solver.edge_contacts``."""
     work.n_crossing.zero_()
 
@@ -33,6 +33,12 @@ def no_crossings(model, x0, x, work, fresh) -> None:
 def by_mass(model, state, work, response, search, move=solver.move_surfaces) -> None:
     """In the place of ``solver.move_surfaces``: deep overlaps are left to the closure too."""
     move(model, state, work, response, False)
+
+
+def blind(model, state, work, response, search, move=solver.move_surfaces) -> None:
+    """In the place of ``solver.move_surfaces``: what the closure moved is not looked at."""
+    with mock.patch.multiple(solver, vertex_contacts=nothing, edge_contacts=nothing):
+        move(model, state, work, response, search)
 
 
 def unseen(model, state, work, response, search, move=solver.move_surfaces) -> None:
@@ -50,6 +56,23 @@ def border_only(model, x, work, find=depth.hit_depths) -> None:
 def without_couple(model, x, v, work, search, close=surface.close) -> None:
     """In the place of ``surface.close``: what it hands back to ``v`` goes to a scratch array."""
     close(model, x, work.v, work, search)
+
+
+def none_held(model, x0, work, search) -> None:
+    """In the place of ``solver.hold_edges``: contacts of edges are found in every step anew."""
+    work.place.fill_(-1)
+    work.n_place.zero_()
+
+
+def no_strays(model, x, work, strays=False, more=False, leftover=surface.leftover) -> None:
+    """In the place of ``surface.leftover``: nobody asks who left a triangle."""
+    leftover(model, x, work, more=more)
+
+
+def rubbing(model, x0, work, first, begin=impulse.begin) -> None:
+    """In the place of ``impulse.begin``: friction across gaps of any width."""
+    begin(model, x0, work, first)
+    work.contacts.mu.fill_(model.friction)
 
 
 def straight(model, x0, work, first, begin=impulse.begin) -> None:

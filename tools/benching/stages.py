@@ -12,25 +12,25 @@ from time import thread_time
 import warp as wp
 
 from benching.memory import held
-from warp_contact import candidates, impulse, solver
+from warp_contact import candidates, impulse, solver, surface
 
 STAGES = {  # the functions of a stage; the outermost call counts
     "damping": ((solver, "damp"),),
     "predict": ((solver, "kick"), (solver, "drift")),
     "candidates": ((candidates, "refresh"),),
     "vertex_contacts": ((solver, "vertex_contacts"),),
-    "edge_contacts": ((solver, "edge_contacts"),),
+    "edge_contacts": ((solver, "edge_contacts"), (solver, "hold_edges")),
     "impulses": (
         (impulse, "recall"),
         (impulse, "exchange"),
         (impulse, "push"),
         (impulse, "push_apart"),
         (impulse, "keep"),
+        (impulse, "keep_edges"),
+        (impulse, "forget_edges"),
         (impulse, "record"),
-        (impulse, "record_vertices"),
-        (impulse, "record_edges"),
     ),
-    "closure": ((solver, "move_surfaces"),),
+    "closure": ((solver, "move_surfaces"), (surface, "leftover")),
 }
 OTHER = "other"  # outside of them all
 MEMORY = (

@@ -16,6 +16,12 @@ Friction acts across the gap, a couple g0 n x p_t that would change the angular 
 taken relative to the turning of the other surface, u_t + g0 sum b_k (n . v_k), and the vertices
 receive g0 (b_k . p_t) n in return, with b_k of contact.py.
 
+The couple ties a friction impulse to the normal velocity, by q = sum N_k / m_k a_k g0 b_k, and to
+itself, by B = sum N_k / m_k g0^2 |b_k|^2. A vertex far lighter than the rest, or the only free one,
+may take more of the couple than of the impulse, so to W is added
+
+    (B + sqrt(B^2 + 4 |q|^2)) / 2           a bound on what they add to its eigenvalues  [1/kg]
+
 Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add kinetic energy
 (Tonge, Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly.
 A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
@@ -46,6 +52,28 @@ def clamped(p: wp.vec3, bound: float) -> wp.vec3:
     if size > bound:
         return p * (bound / size)
     return p
+
+
+@wp.func
+def couple_weight(
+    c: int,
+    vert: wp.array2d[int],
+    coef: wp.array2d[float],
+    start: wp.array[int],
+    inv_mass: wp.array[float],
+    open: wp.array[float],
+    turn: wp.array2d[wp.vec3],
+) -> float:
+    """What the couple of contact c adds to the largest eigenvalue of its matrix, a bound."""
+    q = wp.vec3(0.0, 0.0, 0.0)
+    b = float(0.0)
+    for k in range(5):
+        i = vert[c, k]
+        m = inv_mass[i] * float(start[i + 1] - start[i])
+        g = open[c] * turn[c, k]
+        q += m * coef[c, k] * g
+        b += m * wp.dot(g, g)
+    return 0.5 * (b + wp.sqrt(b * b + 4.0 * wp.dot(q, q)))
 
 
 @wp.kernel
@@ -101,6 +129,8 @@ def begin_contacts(
             open[c] = 0.0
             if not on_plane:
                 mu[c] = 0.0
+        if mu[c] > 0.0 and open[c] != 0.0:
+            weight[c] = w + couple_weight(c, vert, coef, start, inv_mass, open, turn)
         if c >= first[0]:
             lam[c] = 0.0
             slip[c] = wp.vec3(0.0, 0.0, 0.0)

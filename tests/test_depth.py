@@ -78,7 +78,8 @@ def test_an_enclosed_body_is_pushed_to_the_nearest_side(stages, find_contacts, j
     np.testing.assert_array_equal(c.vert[used, 0], inner)
     # Distances of order 1 in float32.
     np.testing.assert_allclose(c.depth[used], 1.0 - x[inner, 2], atol=1e-6)
-    np.testing.assert_allclose(c.normal[used], [[0.0, 0.0, 1.0]] * len(inner), atol=1e-5)
+    # The triangle beside may be as near in float32: the direction is off by sqrt(2 eps) then.
+    np.testing.assert_allclose(c.normal[used], [[0.0, 0.0, 1.0]] * len(inner), atol=5e-4)
 
 
 def test_contact_weights_sum_to_zero_and_directions_are_unit(

@@ -30,7 +30,7 @@ wp.set_module_options({"enable_backward": False})
 
 LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
 MEAN = wp.constant(0.08)  # of the shortest edge: longer lists cost more than they save
-SHORTEST = wp.constant(3.0)  # span
+SHORTEST = wp.constant(2.0)  # span
 LONGEST = wp.constant(64.0)  # span
 UNIT = wp.constant(1.0e4)  # counts of an edge, for a sum that does not depend on its order
 CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves

@@ -23,7 +23,7 @@ append what they find to a list in any order; pairs.py sorts it.
 import warp as wp
 
 from warp_contact.kernels.geometry import boxes_meet
-from warp_contact.kernels.near import MANY, Near, next_near, part, reaches
+from warp_contact.kernels.near import MANY, Near, is_near, part, reaches
 from warp_contact.kernels.pairs import append
 
 wp.set_module_options({"enable_backward": False})
@@ -122,29 +122,55 @@ def widest_skins(
     skin[m] = own_skin(motion[m], edge, LONGEST) + fastest[0]
 
 
+@wp.func
+def spare(m: int, motions: float, edge: float, motion: wp.array[float]) -> wp.vec3:
+    """By how much a skin of so many motions is less wide than the widest."""
+    d = own_skin(motion[m], edge, LONGEST) - own_skin(motion[m], edge, motions)
+    return wp.vec3(d, d, d)
+
+
+@wp.func
+def meet_within(
+    m: int, other: int, motions: float, edge: float, motion: wp.array[float], of: Near
+) -> bool:
+    """Whether the boxes of two bodies meet with skins of so many motions."""
+    a = spare(m, motions, edge, motion)
+    b = spare(other, motions, edge, motion)
+    return boxes_meet(
+        of.lower[m] + a, of.upper[m] - a, of.lower[other] + b, of.upper[other] - b
+    )
+
+
 @wp.kernel
 def choose_skins(
     # in
     edge: float,  # shortest mean edge of a body [m]
-    fastest: wp.array[float],  # (1,) [m]
     total: wp.array[int],  # (1,) sum of the motions
     motion: wp.array[float],  # (n_body,) [m]
-    n_near: wp.array[int],  # (n_body,)
-    near: wp.array2d[int],  # (n_body, MANY)
+    of: Near,  # with the widest skins
     # out
     skin: wp.array[float],  # (n_body,) [m]
     stale: wp.array[int],  # (1,) 0
 ):
     """One thread per body."""
     m = wp.tid()
-    push = float(fastest[0])
-    if n_near[m] <= MANY:
-        push = float(0.0)
-        for k in range(n_near[m]):
-            push = wp.max(push, motion[near[m, k]])
+    looks = span(total[0], motion.shape[0])
+    push = float(0.0)
+    other = int(0)
+    if of.n_near[m] <= MANY:
+        for k in range(of.n_near[m]):
+            other = of.near[m, k]
+            if meet_within(m, other, looks, edge, motion, of):
+                push = wp.max(push, motion[other])
+    else:
+        root = wp.bvh_get_group_root(of.bodies, of.world[m])
+        query = wp.bvh_query_aabb(of.bodies, of.lower[m], of.upper[m], root)
+        while wp.bvh_query_next(query, other):
+            if other != m and meet_within(m, other, looks, edge, motion, of):
+                push = wp.max(push, motion[other])
     motions = float(LONGEST)
-    if n_near[m] > 0:
-        motions = span(total[0], motion.shape[0])
+    if of.n_near[m] > 0:
+        motions = looks
     skin[m] = own_skin(motion[m], edge, motions) + push
     stale[0] = 0
 
@@ -250,13 +276,16 @@ def visit_edges(
                             if gap_to(p, q, tris[t], reach, x) <= reach:
                                 append(e, t, found, n_found)
     else:
-        body = next_near(m, -1, own, of)
-        while body >= 0:
-            reach = skin[m] + skin[body]
-            t = int(0)
-            root = wp.bvh_get_group_root(surface, body)
-            query = wp.bvh_query_aabb(surface, own.lo, own.hi, root)
-            while wp.bvh_query_next(query, t):
-                if gap_to(p, q, tris[t], reach, x) <= reach:
-                    append(e, t, found, n_found)
-            body = next_near(m, body, own, of)
+        body = int(0)
+        around = wp.bvh_query_aabb(
+            of.bodies, own.lo, own.hi, wp.bvh_get_group_root(of.bodies, of.world[m])
+        )
+        while wp.bvh_query_next(around, body):
+            if is_near(m, body, own, of):
+                reach = skin[m] + skin[body]
+                t = int(0)
+                root = wp.bvh_get_group_root(surface, body)
+                query = wp.bvh_query_aabb(surface, own.lo, own.hi, root)
+                while wp.bvh_query_next(query, t):
+                    if gap_to(p, q, tris[t], reach, x) <= reach:
+                        append(e, t, found, n_found)

@@ -11,7 +11,7 @@ half-space counts as a body with one tet.
 import warp as wp
 
 from warp_contact.kernels.geometry import boxes_meet, in_box
-from warp_contact.kernels.near import MANY, Near, next_near, part, reaches
+from warp_contact.kernels.near import MANY, Near, any_near, is_near, part, reaches
 from warp_contact.kernels.pairs import append
 
 wp.set_module_options({"enable_backward": False})
@@ -51,7 +51,7 @@ def count_cells(
     i = wp.tid()
     m = vert_body[i]
     key[i] = -1
-    if next_near(m, -1, part(x[i], x[i], x[i], x[i], skin[m]), of) >= 0:
+    if any_near(m, part(x[i], x[i], x[i], x[i], skin[m]), of):
         h = hash_of(cell_of(x[i], size), m, count.shape[0] - 1)
         key[i] = h
         wp.atomic_add(count, h, 1)
@@ -182,17 +182,19 @@ def visit_tets(
                         cell_vert, x, found, n_found
                     )  # fmt: skip
     else:
-        body = next_near(m, -1, own, of)
-        while body >= 0:
-            grow = wp.vec3(skin[body], skin[body], skin[body])
-            lo = wp.max(own.lo - grow, of.lower[body])
-            hi = wp.min(own.hi + grow, of.upper[body])
-            reach = skin[m] + skin[body]
-            visit_cells(
-                q, body, size, lo, hi, reach, tets, vert_body, body_vert, cell_start,
-                cell_vert, x, found, n_found
-            )  # fmt: skip
-            body = next_near(m, body, own, of)
+        other = int(0)
+        root = wp.bvh_get_group_root(of.bodies, of.world[m])
+        query = wp.bvh_query_aabb(of.bodies, own.lo, own.hi, root)
+        while wp.bvh_query_next(query, other):
+            if is_near(m, other, own, of):
+                grow = wp.vec3(skin[other], skin[other], skin[other])
+                lo = wp.max(own.lo - grow, of.lower[other])
+                hi = wp.min(own.hi + grow, of.upper[other])
+                reach = skin[m] + skin[other]
+                visit_cells(
+                    q, other, size, lo, hi, reach, tets, vert_body, body_vert, cell_start,
+                    cell_vert, x, found, n_found
+                )  # fmt: skip
 
 
 @wp.kernel

@@ -226,21 +226,26 @@ def fits(
 
 
 @wp.func
-def next_near(m: int, last: int, p: Part, of: Near) -> int:
-    """The first body after ``last`` that a part of body m may touch, or -1."""
+def is_near(m: int, body: int, p: Part, of: Near) -> bool:
+    """Whether a part of body m, which has no list, may touch another body."""
+    if body == m or of.n_near[body] == 0:
+        return False
+    return boxes_meet(p.lo, p.hi, of.lower[body], of.upper[body])
+
+
+@wp.func
+def any_near(m: int, p: Part, of: Near) -> bool:
+    """Whether a part of body m may touch another body."""
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
             body = of.near[m, k]
-            if body > last and reaches(p, of.slab[m, k]):
-                if boxes_meet(p.lo, p.hi, of.lower[body], of.upper[body]):
-                    return body
-        return -1
-    first = int(-1)
-    body = int(0)
+            if reaches(p, of.slab[m, k]) and boxes_meet(p.lo, p.hi, of.lower[body], of.upper[body]):
+                return True
+        return False
+    other = int(0)
     root = wp.bvh_get_group_root(of.bodies, of.world[m])
     query = wp.bvh_query_aabb(of.bodies, p.lo, p.hi, root)
-    while wp.bvh_query_next(query, body):
-        if body != m and body > last and (first < 0 or body < first):
-            if of.n_near[body] > 0 and boxes_meet(p.lo, p.hi, of.lower[body], of.upper[body]):
-                first = body
-    return first
+    while wp.bvh_query_next(query, other):
+        if is_near(m, other, p, of):
+            return True
+    return False

@@ -72,7 +72,7 @@ def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
     wp.launch(
         candidates.choose_skins,
         dim=model.n_body,
-        inputs=[c.edge, c.fastest, c.total, c.motion, work.near.n_near, work.near.near],
+        inputs=[c.edge, c.total, c.motion, work.near],
         outputs=[c.skin, c.stale],
     )
     _find_near(model, work)

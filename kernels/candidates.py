@@ -2,16 +2,18 @@
 
 Candidates are found at the positions of some step. As long as no vertex is further than the skin of
 its body from there, all that touches is among them, and the steps test them exactly: the same
-contacts come out as without (Verlet 1967). They are found again once some vertex has moved by half
-the skin; the other half is for what impulses and the closure add to the prediction within a step.
+contacts come out as without (Verlet 1967). They are found again once the prediction of some vertex
+is as far away as is free; the rest of the skin is reserved for what impulses and the closure add
+within a step: they may stop the body, and what is near may push it on.
 
-    skin = span times the largest motion of the body in a step, but LEAST of the shortest edge,
-           and the largest motion of the bodies near it, which may push it on             [m]
+    free    = max(looks d, LEAST e / 2) + D / 2     [m]
+    reserve = max(d, LEAST e / 2) + D / 2           [m]     skin = free + reserve
 
-Half the span is the number of steps that candidates last. It is the same for all bodies, and such
-that the mean of them has a skin of MEAN edges: some fast bodies do not wear out the candidates of a
-pile at rest, and where all are fast the lists stay short. A body that has nothing near, even if all
-had the LONGEST, gets it. One with more than MANY near takes the fastest of all as near.
+d is the largest motion of the body in a step, D that of the bodies near it, e the shortest edge.
+The number of looks is the same for all bodies, and such that looks d is MEAN edges on average: some
+fast bodies do not wear out the candidates of a pile at rest, and where all are fast the lists stay
+short. What swings does not go far: candidates last several times as long. A body that has nothing
+near, even if all had the LONGEST, gets it.
 
 Most candidates are not close to touching. A pair that is found apart by some distance sleeps until
 both bodies have come that way together; ``way`` adds up the largest motion of a body in each look.
@@ -30,8 +32,8 @@ wp.set_module_options({"enable_backward": False})
 
 LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
 MEAN = wp.constant(0.08)  # of the shortest edge: longer lists cost more than they save
-SHORTEST = wp.constant(2.0)  # span
-LONGEST = wp.constant(64.0)  # span
+SHORTEST = wp.constant(1.0)  # looks
+LONGEST = wp.constant(32.0)  # looks
 UNIT = wp.constant(1.0e4)  # counts of an edge, for a sum that does not depend on its order
 CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves
 FADING = wp.constant(0.8)  # of a motion from look to look
@@ -42,18 +44,18 @@ CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the 
 def moved(
     # in
     vert_body: wp.array[int],  # (n_vert,)
-    skin: wp.array[float],  # (n_body,) [m]
+    free: wp.array[float],  # (n_body,) [m]
     built: wp.array[wp.vec3],  # (n_vert,) [m] positions of the candidates
     x0: wp.array[wp.vec3],  # (n_vert,) [m]
     x1: wp.array[wp.vec3],  # (n_vert,) [m]
     # out, added to
     stale: wp.array[int],  # (1,) 1 when the candidates have to be found again
 ):
-    """One thread per vertex: whether it has used up half of the skin."""
+    """One thread per vertex: whether it is further away than is free."""
     i = wp.tid()
     d = wp.max(wp.length_sq(x0[i] - built[i]), wp.length_sq(x1[i] - built[i]))
-    half = 0.5 * skin[vert_body[i]]
-    if not d <= half * half:
+    most = free[vert_body[i]]
+    if not d <= most * most:
         stale[0] = 1
 
 
@@ -97,15 +99,15 @@ def find_fastest(
 
 
 @wp.func
-def span(total: int, n_body: int) -> float:
-    """Largest motions in a step that a skin holds."""
+def looks_at(total: int, n_body: int) -> float:
+    """Looks that candidates last."""
     mean = float(total) / (UNIT * float(n_body))
     return wp.clamp(MEAN / wp.max(mean, 1.0e-6), SHORTEST, LONGEST)
 
 
 @wp.func
-def own_skin(motion: float, edge: float, motions: float) -> float:
-    return wp.max(motions * motion, LEAST * edge)
+def of_motion(motion: float, edge: float, times: float) -> float:
+    return wp.max(times * motion, 0.5 * LEAST * edge)
 
 
 @wp.kernel
@@ -119,26 +121,25 @@ def widest_skins(
 ):
     """One thread per body: the longest that it may get."""
     m = wp.tid()
-    skin[m] = own_skin(motion[m], edge, LONGEST) + fastest[0]
+    own = of_motion(motion[m], edge, LONGEST) + of_motion(motion[m], edge, 1.0)
+    skin[m] = own + fastest[0]
 
 
 @wp.func
-def spare(m: int, motions: float, edge: float, motion: wp.array[float]) -> wp.vec3:
-    """By how much a skin of so many motions is less wide than the widest."""
-    d = own_skin(motion[m], edge, LONGEST) - own_skin(motion[m], edge, motions)
+def spare(m: int, looks: float, edge: float, motion: wp.array[float]) -> wp.vec3:
+    """By how much a skin for so many looks is less wide than the widest."""
+    d = of_motion(motion[m], edge, LONGEST) - of_motion(motion[m], edge, looks)
     return wp.vec3(d, d, d)
 
 
 @wp.func
 def meet_within(
-    m: int, other: int, motions: float, edge: float, motion: wp.array[float], of: Near
+    m: int, other: int, looks: float, edge: float, motion: wp.array[float], of: Near
 ) -> bool:
-    """Whether the boxes of two bodies meet with skins of so many motions."""
-    a = spare(m, motions, edge, motion)
-    b = spare(other, motions, edge, motion)
-    return boxes_meet(
-        of.lower[m] + a, of.upper[m] - a, of.lower[other] + b, of.upper[other] - b
-    )
+    """Whether the boxes of two bodies meet with skins for so many looks."""
+    a = spare(m, looks, edge, motion)
+    b = spare(other, looks, edge, motion)
+    return boxes_meet(of.lower[m] + a, of.upper[m] - a, of.lower[other] + b, of.upper[other] - b)
 
 
 @wp.kernel
@@ -149,12 +150,13 @@ def choose_skins(
     motion: wp.array[float],  # (n_body,) [m]
     of: Near,  # with the widest skins
     # out
+    free: wp.array[float],  # (n_body,) [m]
     skin: wp.array[float],  # (n_body,) [m]
     stale: wp.array[int],  # (1,) 0
 ):
     """One thread per body."""
     m = wp.tid()
-    looks = span(total[0], motion.shape[0])
+    looks = looks_at(total[0], motion.shape[0])
     push = float(0.0)
     other = int(0)
     if of.n_near[m] <= MANY:
@@ -168,10 +170,10 @@ def choose_skins(
         while wp.bvh_query_next(query, other):
             if other != m and meet_within(m, other, looks, edge, motion, of):
                 push = wp.max(push, motion[other])
-    motions = float(LONGEST)
-    if of.n_near[m] > 0:
-        motions = looks
-    skin[m] = own_skin(motion[m], edge, motions) + push
+    if of.n_near[m] == 0:
+        looks = LONGEST
+    free[m] = of_motion(motion[m], edge, looks) + 0.5 * push
+    skin[m] = free[m] + of_motion(motion[m], edge, 1.0) + 0.5 * push
     stale[0] = 0
 
 

@@ -15,7 +15,7 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     wp.launch(
         candidates.moved,
         dim=model.n_vert,
-        inputs=[model.vert_body, c.skin, c.x, x0, x1],
+        inputs=[model.vert_body, c.free, c.x, x0, x1],
         outputs=[c.stale],
     )
 
@@ -54,7 +54,7 @@ def _move(model: Model, x: wp.array, work: Work) -> None:
 
 
 def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
-    """Set ``skin`` for a step to ``x1``, ``near`` and the boxes of the bodies."""
+    """Set ``free`` and ``skin`` for a step to ``x1``, ``near`` and the boxes of the bodies."""
     c = work.candidates
     c.motion.zero_()
     c.fastest.zero_()
@@ -73,7 +73,7 @@ def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
         candidates.choose_skins,
         dim=model.n_body,
         inputs=[c.edge, c.total, c.motion, work.near],
-        outputs=[c.skin, c.stale],
+        outputs=[c.free, c.skin, c.stale],
     )
     _find_near(model, work)
 

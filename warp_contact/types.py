@@ -170,6 +170,7 @@ class Candidates:
 
     Attributes:
         x: positions of the candidates [m], shape (n_vert,)
+        free: how far from them a prediction may be [m], shape (n_body,)
         skin: how far from them they hold [m], shape (n_body,)
         motion: largest motion of each body since the last look [m], shape (n_body,)
         pace: what motion to expect in the next looks [m], shape (n_body,)
@@ -188,6 +189,7 @@ class Candidates:
     """
 
     x: wp.array
+    free: wp.array
     skin: wp.array
     motion: wp.array
     pace: wp.array

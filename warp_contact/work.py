@@ -248,6 +248,7 @@ def _allocate_near(
 def _allocate_candidates(model: Model, capacity: Capacity) -> Candidates:
     return Candidates(
         x=_vectors(model.n_vert),
+        free=_floats(model.n_body),
         skin=_floats(model.n_body),
         motion=_floats(model.n_body),
         pace=_floats(model.n_body),

@@ -18,9 +18,9 @@ receive g0 (b_k . p_t) n in return, with b_k of contact.py.
 
 The couple ties a friction impulse to the normal velocity, by q = sum N_k / m_k a_k g0 b_k, and to
 itself, by B = sum N_k / m_k g0^2 |b_k|^2. A vertex far lighter than the rest, or the only free one,
-may take more of the couple than of the impulse, so to W is added
+may take more of the couple than of the impulse, so here W is
 
-    (B + sqrt(B^2 + 4 |q|^2)) / 2           a bound on what they add to its eigenvalues  [1/kg]
+    W + (B + sqrt(B^2 + 4 |q|^2)) / 2       a bound on the eigenvalues of the contact     [1/kg]
 
 Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add kinetic energy
 (Tonge, Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly.
@@ -94,7 +94,8 @@ def begin_contacts(
     dt: wp.array[float],  # (1,) [s]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     # out
-    weight: wp.array[float],  # (capacity,) [1/kg]
+    weight: wp.array[float],  # (capacity,) [1/kg] W
+    coupled: wp.array[float],  # (capacity,) [1/kg] W with that of the couple
     closing: wp.array[float],  # (capacity,) [m/s] approach that is allowed, < 0: overlap at x0
     open: wp.array[float],  # (capacity,) [m] g0, 0 where no surface can take the couple
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m] b_k
@@ -111,6 +112,7 @@ def begin_contacts(
             i = vert[c, k]
             w += a * a * inv_mass[i] * float(start[i + 1] - start[i])
         weight[c] = w
+        coupled[c] = w
         on_plane = pair[c][1] >= body_edge.shape[0]
         g = gap(c, vert, coef, normal, offset, on_plane, x0)
         closing[c] = (g - REST * body_edge[pair[c][0]]) / dt[0]
@@ -130,7 +132,7 @@ def begin_contacts(
             if not on_plane:
                 mu[c] = 0.0
         if mu[c] > 0.0 and open[c] != 0.0:
-            weight[c] = w + couple_weight(c, vert, coef, start, inv_mass, open, turn)
+            coupled[c] = w + couple_weight(c, vert, coef, start, inv_mass, open, turn)
         if c >= first[0]:
             lam[c] = 0.0
             slip[c] = wp.vec3(0.0, 0.0, 0.0)
@@ -179,7 +181,7 @@ def solve_contacts(
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
     normal: wp.array[wp.vec3],  # (capacity,)
-    weight: wp.array[float],  # (capacity,) [1/kg]
+    coupled: wp.array[float],  # (capacity,) [1/kg]
     closing: wp.array[float],  # (capacity,) [m/s]
     open: wp.array[float],  # (capacity,) [m]
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
@@ -208,7 +210,7 @@ def solve_contacts(
                 for k in range(5):
                     part[5 * c + k] = wp.vec3(0.0, 0.0, 0.0)
             continue
-        if weight[c] == 0.0:
+        if coupled[c] == 0.0:
             busy[c] = 0
             for k in range(5):
                 part[5 * c + k] = wp.vec3(0.0, 0.0, 0.0)
@@ -224,13 +226,13 @@ def solve_contacts(
         excess = un + wp.max(closing[c], 0.0)
         y = ahead[c]
         yt = wp.vec3(y[0], y[1], y[2])
-        new_lam = wp.max(y[3] - excess / weight[c], 0.0)
-        off = wp.abs(new_lam - y[3]) * weight[c]
+        new_lam = wp.max(y[3] - excess / coupled[c], 0.0)
+        off = wp.abs(new_lam - y[3]) * coupled[c]
         if off * dt[0] > tolerance * body_edge[pair[c][0]] and sweep < sweeps:
             again[0] = 1
         new_slip = wp.vec3(0.0, 0.0, 0.0)
         if mu[c] > 0.0:
-            new_slip = clamped(yt - (u - un * n) / weight[c], mu[c] * new_lam)
+            new_slip = clamped(yt - (u - un * n) / coupled[c], mu[c] * new_lam)
         beta = float(0.0)
         if not last:
             beta = float(sweep - 1) / float(sweep + 2)
@@ -242,7 +244,7 @@ def solve_contacts(
         for k in range(5):
             part[5 * c + k] = coef[c, k] * change + open[c] * wp.dot(turn[c, k], change) * n
             served[vert[c, k]] = sweep
-        busy[c] = wp.where(wp.length(change) * weight[c] * dt[0] > little, 2, 1)
+        busy[c] = wp.where(wp.length(change) * coupled[c] * dt[0] > little, 2, 1)
         ahead[c] = wp.vec4(next_slip[0], next_slip[1], next_slip[2], next_lam)
         lam[c] = new_lam
         slip[c] = new_slip

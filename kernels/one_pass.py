@@ -34,7 +34,7 @@ def give(
     mu: float,
     coef: wp.array2d[float],
     normal: wp.array[wp.vec3],
-    weight: wp.array[float],
+    coupled: wp.array[float],
     open: wp.array[float],
     turn: wp.array2d[wp.vec3],
     lam: wp.array[float],
@@ -45,7 +45,7 @@ def give(
     n = normal[c]
     rubbed = wp.vec3(0.0, 0.0, 0.0)
     if impulse > 0.0:
-        rubbed = clamped(-(u - wp.dot(u, n) * n) / weight[c], mu * impulse)
+        rubbed = clamped(-(u - wp.dot(u, n) * n) / coupled[c], mu * impulse)
     p = impulse * n + rubbed
     for k in range(5):
         part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n

@@ -25,7 +25,7 @@ def penalty_impulses(
     coef: wp.array2d[float],  # (capacity, 5)
     normal: wp.array[wp.vec3],  # (capacity,)
     depth: wp.array[float],  # (capacity,) [m]
-    weight: wp.array[float],  # (capacity,) [1/kg]
+    coupled: wp.array[float],  # (capacity,) [1/kg]
     open: wp.array[float],  # (capacity,) [m]
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
@@ -38,6 +38,6 @@ def penalty_impulses(
     for c in range(wp.tid(), n_contact[0], threads):
         u = relative_velocity(c, vert, coef, v)
         p = float(0.0)
-        if weight[c] > 0.0 and depth[c] > 0.0:
+        if coupled[c] > 0.0 and depth[c] > 0.0:
             p = dt[0] * wp.max(stiffness * depth[c] - damping * wp.dot(u, normal[c]), 0.0)
-        give(c, p, u, mu, coef, normal, weight, open, turn, lam, slip, part)
+        give(c, p, u, mu, coef, normal, coupled, open, turn, lam, slip, part)

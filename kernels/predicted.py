@@ -7,9 +7,9 @@ of the idea with the contacts of this package:
     g = (sum a_k x*_k) . n - offset               its gap                         [m]
     lambda = h F,  F = max(0, -g) / (h^2 W)       normal impulse of a step        [N s]
 
-with W of impulse.py, where N_k contacts share vertex k. A single contact without friction is closed
-exactly: F moves its two sides by h^2 W F against each other. Where N contacts ask the same of a
-vertex, each gives it the N-th part. Friction (one_pass.py) acts against the slip of v*.
+with W of impulse.py, where N_k contacts share vertex k. A single contact is closed exactly: F moves
+its two sides by h^2 W F against each other. Where N contacts ask the same of a vertex, each gives
+it the N-th part. Friction (one_pass.py) acts against the slip of v*.
 """
 
 import warp as wp
@@ -34,6 +34,7 @@ def predicted_impulses(
     offset: wp.array[float],  # (capacity,) [m]
     pair: wp.array[wp.vec2i],  # (capacity,)
     weight: wp.array[float],  # (capacity,) [1/kg]
+    coupled: wp.array[float],  # (capacity,) [1/kg]
     open: wp.array[float],  # (capacity,) [m]
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
     x: wp.array[wp.vec3],  # (n_vert,) [m] predicted
@@ -50,4 +51,4 @@ def predicted_impulses(
             g = gap(c, vert, coef, normal, offset, pair[c][1] >= n_body, x)
             p = wp.max(-g, 0.0) / (dt[0] * weight[c])
         u = relative_velocity(c, vert, coef, v)
-        give(c, p, u, mu, coef, normal, weight, open, turn, lam, slip, part)
+        give(c, p, u, mu, coef, normal, coupled, open, turn, lam, slip, part)

@@ -21,7 +21,7 @@ def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
         work.capacity.contacts,
         inputs=[model.friction, first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
         + [model.inv_mass, model.body_edge, work.dt, x0],
-        outputs=[c.weight, c.closing, c.open, c.turn, c.mu, c.lam, c.slip, c.ahead],
+        outputs=[c.weight, c.coupled, c.closing, c.open, c.turn, c.mu, c.lam, c.slip, c.ahead],
     )
 
 
@@ -97,7 +97,7 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
             impulse.solve_contacts,
             work.capacity.contacts,
             inputs=[TOLERANCE, _little(work), SWEEPS, work.dt, model.body_edge, c.pair, work.done]
-            + [c.n, c.vert, c.coef, c.normal, c.weight, c.closing, c.open, c.turn]
+            + [c.n, c.vert, c.coef, c.normal, c.coupled, c.closing, c.open, c.turn]
             + [c.mu, work.stirred, v, last],
             outputs=[c.lam, c.slip, c.ahead, c.busy, c.part, work.served, work.again],
         )
@@ -120,7 +120,7 @@ def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:
         penalty.penalty_impulses,
         work.capacity.contacts,
         inputs=[response.stiffness, response.damping, model.friction, work.dt]
-        + [c.n, c.vert, c.coef, c.normal, c.depth, c.weight, c.open, c.turn, v],
+        + [c.n, c.vert, c.coef, c.normal, c.depth, c.coupled, c.open, c.turn, v],
         outputs=[c.lam, c.slip, c.part],
     )
     _apply(model, v, work)
@@ -133,7 +133,8 @@ def push_apart(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
         predicted.predicted_impulses,
         work.capacity.contacts,
         inputs=[model.n_body, model.friction, work.dt]
-        + [c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.weight, c.open, c.turn, x, v],
+        + [c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.weight, c.coupled]
+        + [c.open, c.turn, x, v],
         outputs=[c.lam, c.slip, c.part],
     )
     _apply(model, v, work)

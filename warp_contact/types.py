@@ -232,6 +232,7 @@ class Contacts:
         n_touched: vertices with entries, shape (1,)
         touched: which ones, in any order, shape (n_vert,)
         weight: sum of coef^2 N / m [1/kg], shape (capacity,)
+        coupled: the same with what the couple of friction adds [1/kg], shape (capacity,)
         closing: approach that is allowed [m/s], negative for an overlap at the start of the step,
             shape (capacity,)
         open: gap at the start of the step [m], shape (capacity,)
@@ -261,6 +262,7 @@ class Contacts:
     n_touched: wp.array
     touched: wp.array
     weight: wp.array
+    coupled: wp.array
     closing: wp.array
     open: wp.array
     turn: wp.array

@@ -295,6 +295,7 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         n_touched=_ints(1),
         touched=_ints(n),
         weight=_floats(m),
+        coupled=_floats(m),
         closing=_floats(m),
         open=_floats(m),
         turn=wp.zeros((m, 5), dtype=wp.vec3),

@@ -36,6 +36,7 @@ STALE = wp.constant(
 )  # of an edge: overlap at the start of a step that tells a wrong direction
 NEAR = wp.constant(0.05)  # of an edge: a vertex this close to a wall may lie in it
 FLUSH = wp.constant(1.0e-5)  # of an edge: a vertex this deep lies in the surface
+BESIDE = wp.constant(0.1)  # weights: where a ray from inside the body leaves far from that outside
 FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
 
 
@@ -84,6 +85,10 @@ def inner_contact(
         ray = leaving_hit(surface, body, tris, x, inner, r)
         if ray.tri >= 0:
             ray.t = wp.dot(hit_point(ray, tris, x) - x[i], r)
+            t = tris[ray.tri]
+            own = projected_weights(x[i], r, x[t[0]], x[t[1]], x[t[2]])
+            if wp.length(own - ray.w) > BESIDE:
+                return out
     if ray.tri >= 0 and ray.t > 0.0 and ray.t <= FAR * depth + NEAR * edge:
         out = contact_at(ray, i, r, tris, x0)
     return out

@@ -1,5 +1,6 @@
 """Cases in which bodies strike each other."""
 
+import numpy as np
 from checks import collision
 from stable import limits
 from stable.setup import attempt
@@ -46,6 +47,19 @@ def balls() -> dict[str, float]:
     """Balls of 147 vertices, one falls on the other."""
     case = next(c for c in limits.cases(False) if "147 vertices" in c.name)
     return {GAINED: max(attempt(case.build, "surface", limit=case.limit).gained, 0.0)}
+
+
+def corner() -> dict[str, float]:
+    """Heavy corners over fixed ones of a light face with a free one, one step."""
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.5)
+    scene.add_body(wc.box(1.0, 1), wc.NeoHookean(1e5, 0.3, 1.0), fixed=np.arange(8) != 5)
+    place, v = (-0.34, -0.34, 0.68), (5.0, 5.0, -45.0)
+    scene.add_body(wc.box(0.3, 1), wc.NeoHookean(1e5, 0.3, 1e6), place, velocity=v)
+    sim = wc.Simulation(scene, fps=1000, substeps=1)
+    before = sim.measure().kinetic
+    sim.step_frame()
+    after = sim.measure()
+    return {GAINED: max((after.kinetic + after.elastic) / before - 1.0, 0.0)}
 
 
 def thin() -> dict[str, float]:

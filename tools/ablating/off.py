@@ -81,6 +81,12 @@ def straight(model, x0, work, first, begin=impulse.begin) -> None:
     work.contacts.open.zero_()
 
 
+def uncoupled(model, x0, work, first, begin=impulse.begin) -> None:
+    """In the place of ``impulse.begin``: the sweeps do not count on what the couple moves."""
+    begin(model, x0, work, first)
+    wp.copy(work.contacts.coupled, work.contacts.weight)
+
+
 def plain(kernel, *args, launch=wp.launch, **kwargs) -> None:
     """In the place of ``wp.launch``: every sweep of the impulses is a plain one, like the last."""
     if kernel is impulse_kernels.solve_contacts:

@@ -108,6 +108,13 @@ PARTS = {
         impacts.SPIN,
         ROUNDED,
     ),
+    "coupled": Part(
+        "weight of that couple in the sweeps",
+        without(impulse, "begin", off.uncoupled),
+        impacts.corner,
+        impacts.GAINED,
+        GAIN,
+    ),
     "warm": Part(
         "start from the last impulses",
         without(impulse, "recall", off.nothing),

@@ -16,7 +16,7 @@ LADDER = (  # a module imports from lower rungs only
     | {"pictures", "launch", "warm"},
     {"mesh", "work", "forces", "usd", "checkpoint", "raycast", "diagnosis", "ready"},
     {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"}
-    | {"rest", "fields", "placement"},
+    | {"rest", "fields", "placement", "room"},
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},
     {"solver", "pace"},
     {"simulation"},

@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 import warp as wp
@@ -20,6 +20,7 @@ from warp_contact.progress import Progress
 from warp_contact.ready import load_kernels
 from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.rest import Rest, keep_forces
+from warp_contact.room import enlarged
 from warp_contact.scene import Body, Scene
 from warp_contact.spectrum import Spectrum
 from warp_contact.substeps import raised, stays_damped, stays_stable
@@ -311,15 +312,13 @@ class Simulation:
     def _grow(self) -> bool:
         """Enlarge the buffers that the frame outgrew, and go back to its start; True if any."""
         work = self._work
-        needed = work.contacts.needed.numpy()
-        if not needed.any():
+        capacity = enlarged(work)
+        if capacity is None:
             return False
         self._restore()
-        old = astuple(work.capacity)
-        capacity = [max(have, 2 * int(n)) for have, n in zip(old, needed, strict=True)]
         forces = work.impulse, work.pair_key, work.pair_total
         del work
-        self._replace_work(Capacity(*capacity))
+        self._replace_work(capacity)
         if self._rest:
             keep_forces(*forces, self._work)
         return True

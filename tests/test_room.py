@@ -1,0 +1,68 @@
+"""room.py: buffers that a frame outgrew, and those that it would soon have outgrown."""
+
+from dataclasses import astuple
+
+import numpy as np
+
+from warp_contact import NeoHookean, Scene, Simulation, box, room
+from warp_contact.types import Capacity
+from warp_contact.work import allocate_work
+
+RUBBER = NeoHookean(1e5, 0.3, 1000.0)
+
+
+def stacked(device) -> Simulation:
+    scene = Scene()
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    for k in range(3):
+        scene.add_body(box(0.1, 2), RUBBER, (0.01 * k, 0.0, 0.05 + 0.1001 * k))
+    sim = Simulation(scene, device=str(device))
+    for _ in sim.frames(3):
+        pass
+    return sim
+
+
+def test_what_fits_stays(device):
+    assert room.enlarged(stacked(device)._work) is None
+
+
+def test_what_is_more_than_half_full_grows_with_what_did_not_fit(device):
+    sim = stacked(device)
+    work = sim._work
+    used = [
+        work.contacts.n.numpy()[0],
+        (work.pair_key.numpy() >= 0).sum(),
+        work.candidates.verts.n.numpy()[0],
+        work.candidates.verts.item_start.numpy()[-1],
+        work.candidates.edges.n.numpy()[0],
+        work.candidates.edges.item_start.numpy()[-1],
+    ]
+    assert min(used) > 0
+    needed = np.zeros(7, dtype=int)
+    needed[0] = work.capacity.contacts + 10
+    work.contacts.needed.assign(needed)
+    got = astuple(room.enlarged(work))
+    assert got[0] == 2 * needed[0]
+    for n, have, now in list(zip(used, astuple(work.capacity), got, strict=False))[1:]:
+        assert now == (2 * n if 2 * n > have else have)
+    assert got[6] >= work.capacity.near
+
+
+def test_lists_that_grow_together_cost_few_frames(device, monkeypatch):
+    sim, grown = stacked(device), []
+    known = sim._work.capacity
+
+    def enlarged(work, enlarged=room.enlarged):
+        capacity = enlarged(work)
+        if capacity:
+            grown.append(capacity)
+        return capacity
+
+    monkeypatch.setattr("warp_contact.simulation.enlarged", enlarged)
+    least = [max(1, n // 4) for n in astuple(known)]
+    sim._work = allocate_work(sim.model, sim.state, Capacity(*least))
+    sim._graphs.clear()
+    sim.step_frame()
+    # In the order of the stages, where one that does not fit hides what comes after it.
+    assert 1 <= len(grown) <= 6
+    assert not sim._work.contacts.needed.numpy().any()

@@ -153,6 +153,7 @@ def choose_skins(
     free: wp.array[float],  # (n_body,) [m]
     skin: wp.array[float],  # (n_body,) [m]
     stale: wp.array[int],  # (1,) 0
+    some: wp.array[int],  # (1,) 0
 ):
     """One thread per body."""
     m = wp.tid()
@@ -175,6 +176,7 @@ def choose_skins(
     free[m] = of_motion(motion[m], edge, looks) + 0.5 * push
     skin[m] = free[m] + of_motion(motion[m], edge, 1.0) + 0.5 * push
     stale[0] = 0
+    some[0] = 0
 
 
 @wp.kernel
@@ -264,6 +266,8 @@ def visit_edges(
     """One thread per surface edge: the triangles that it may come to cross."""
     e = wp.tid()
     m = vert_body[edges[e][0]]
+    if of.n_near[m] == 0:
+        return
     p = x[edges[e][0]]
     q = x[edges[e][1]]
     own = part(p, p, q, q, skin[m])

@@ -59,6 +59,8 @@ def near_bodies(
     near: wp.array2d[int],  # (n_body, MANY), ascending
     slab: wp.array2d[wp.vec4],  # (n_body, MANY) axis towards the near body, where it begins [m]
     end: wp.array2d[float],  # (n_body, MANY) where the own body ends along the axis [m]
+    # out, added to
+    some: wp.array[int],  # (1,) 1 when any body is near another
 ):
     """One thread per body: list the bodies of its world that may touch it, if one is awake."""
     m = wp.tid()
@@ -88,6 +90,8 @@ def near_bodies(
                         end[m, k] = last
                     count += 1
     n_near[m] = count
+    if count > 0:
+        some[0] = 1
 
 
 @wp.struct

@@ -167,6 +167,33 @@ def test_a_fast_body_does_not_reach_for_others_with_its_own_skin(stages):
     assert long == pytest.approx(32.0, rel=1e-3)
 
 
+def test_nothing_is_looked_for_where_no_body_is_near(stages, monkeypatch):
+    looked = []
+    monkeypatch.setattr(
+        candidates, "_find_tets", lambda *a, f=candidates._find_tets: looked.append(f(*a))
+    )
+    for away, plane in ((0.101, False), (1.0, False), (1.0, True)):
+        scene = Scene()
+        if plane:
+            scene.add_plane((0.0, 0.0, 1.0), -0.05)
+        scene.add_body(box(0.1, 2), RUBBER)
+        scene.add_body(box(0.1, 2), RUBBER, (away, 0.0, 0.0))
+        model, state, work = stages(scene)
+        looked.clear()
+        candidates.refresh(model, state.x, state.x, work)
+        c = work.candidates
+        near = away < 0.5
+        assert len(looked) == (1 if near or plane else 0)
+        assert (c.edges.n.numpy()[0] > 0) == near and (c.verts.n.numpy()[0] > 0) == (near or plane)
+        assert c.some.numpy()[0] == (1 if near or plane else 0)
+        # They part: what was listed is forgotten.
+        x = state.x.numpy()
+        x[model.vert_body.numpy() == 1] += (3.0, 0.0, 1.0)
+        state.x.assign(x)
+        candidates.refresh(model, state.x, state.x, work)
+        assert c.edges.n.numpy()[0] == 0 and not c.edges.start.numpy().any()
+
+
 def test_hits_are_sorted_by_vertex_and_body_with_planes_last(rng, stages, jittered, turned):
     scene = Scene()
     scene.add_plane((0.0, 0.0, 1.0), -0.1)

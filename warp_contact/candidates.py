@@ -26,10 +26,22 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
         c.verts.wake.fill_(-1.0)
         c.edges.wake.fill_(-1.0)
         _choose_skins(model, x1, work)
+        if model.n_plane:
+            list_pairs()
+        else:
+            wp.capture_if(c.some, list_pairs, none)
+
+    def list_pairs() -> None:
         _find_parts(model, work)
         _find_tets(model, work)
         _find_tris(model, work)
         wp.launch(kernels.any_pairs, dim=1, inputs=[c.verts.n, c.edges.n], outputs=[c.some])
+
+    def none() -> None:
+        for pairs in (c.verts, c.edges):
+            pairs.n.zero_()
+            pairs.start.zero_()
+            pairs.item_start.zero_()
 
     wp.capture_if(c.stale, find)
 
@@ -73,7 +85,7 @@ def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
         candidates.choose_skins,
         dim=model.n_body,
         inputs=[c.edge, c.total, c.motion, work.near],
-        outputs=[c.free, c.skin, c.stale],
+        outputs=[c.free, c.skin, c.stale, c.some],
     )
     _find_near(model, work)
 
@@ -89,7 +101,7 @@ def _find_near(model: Model, work: Work) -> None:
         inputs=[model.cell, c.skin, work.bodies.id, model.body_world, model.body_vert]
         + [work.awake.bodies]
         + [work.lower, work.upper, c.x],
-        outputs=[of.n_near, of.near, of.slab, of.end],
+        outputs=[of.n_near, of.near, of.slab, of.end, c.some],
     )
 
 

@@ -11,6 +11,22 @@ CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the 
 GROW = wp.constant(1.0e-5)  # of an edge: a flat triangle's box must not vanish for a ray
 
 
+@wp.func
+def next_in(boxes: wp.uint64, group: int, lo: wp.vec3, hi: wp.vec3, last: int) -> int:
+    """The first box of a group after ``last`` that meets the one from lo to hi, or -1.
+
+    For loops with queries inside: on a GPU all queries of a thread share one stack, so that one has
+    to end before another begins.
+    """
+    first = int(-1)
+    item = int(0)
+    query = wp.bvh_query_aabb(boxes, lo, hi, wp.bvh_get_group_root(boxes, group))
+    while wp.bvh_query_next(query, item):
+        if item > last and (first < 0 or item < first):
+            first = item
+    return first
+
+
 @wp.kernel
 def clear_boxes(
     # out

@@ -4,8 +4,8 @@ Contact c has vertices k with signed weights a_k (positive on the side that move
 
     u = sum a_k v_k                              relative velocity              [m/s]
     W = sum a_k^2 N_k / m_k                      N_k contacts share vertex k    [1/kg]
-    lambda <- max(0, lambda - (u . n + c) / W)   c = max(0, g0 - rest) / h      [N s]
-    p_t <- p_t - u_t / W, |p_t| <= mu lambda                                    [N s]
+    lambda <- max(0, lambda - (u . n + c) / W_c) c = max(0, g0 - rest) / h      [N s]
+    p_t <- p_t - u_t / W_c, |p_t| <= mu lambda   W_c = W without the couple     [N s]
     v_k += a_k (d lambda n + d p_t) / m_k        with the whole mass
 
 The gap g0 at the start of the step may close to a resting gap at its end, not further: u . n >= -c.
@@ -18,9 +18,9 @@ receive g0 (b_k . p_t) n in return, with b_k of contact.py.
 
 The couple ties a friction impulse to the normal velocity, by q = sum N_k / m_k a_k g0 b_k, and to
 itself, by B = sum N_k / m_k g0^2 |b_k|^2. A vertex far lighter than the rest, or the only free one,
-may take more of the couple than of the impulse, so here W is
+may take more of the couple than of the impulse, so the sweeps use
 
-    W + (B + sqrt(B^2 + 4 |q|^2)) / 2       a bound on the eigenvalues of the contact     [1/kg]
+    W_c = W + (B + sqrt(B^2 + 4 |q|^2)) / 2      bounds the eigenvalues of the contact   [1/kg]
 
 Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add kinetic energy
 (Tonge, Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly.
@@ -95,7 +95,7 @@ def begin_contacts(
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     # out
     weight: wp.array[float],  # (capacity,) [1/kg] W
-    coupled: wp.array[float],  # (capacity,) [1/kg] W with that of the couple
+    coupled: wp.array[float],  # (capacity,) [1/kg] W_c
     closing: wp.array[float],  # (capacity,) [m/s] approach that is allowed, < 0: overlap at x0
     open: wp.array[float],  # (capacity,) [m] g0, 0 where no surface can take the couple
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m] b_k
@@ -181,7 +181,7 @@ def solve_contacts(
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
     normal: wp.array[wp.vec3],  # (capacity,)
-    coupled: wp.array[float],  # (capacity,) [1/kg]
+    coupled: wp.array[float],  # (capacity,) [1/kg] W_c
     closing: wp.array[float],  # (capacity,) [m/s]
     open: wp.array[float],  # (capacity,) [m]
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]

@@ -6,6 +6,7 @@ ends outside by the distance of the middle of its inner piece to that surface.
 
 import warp as wp
 
+from warp_contact.kernels.bounds import next_in
 from warp_contact.kernels.geometry import tet_weights
 from warp_contact.kernels.surface_query import closest_hit, first_crossing, inner_side
 
@@ -98,10 +99,9 @@ def edge_overlaps(
     own = vert_body[edges[e][0]]
     overlap[e] = 0.0
     partner[e] = -1
-    body = int(0)
-    root = wp.bvh_get_group_root(bodies, body_world[own])
-    query = wp.bvh_query_aabb(bodies, wp.min(p, q), wp.max(p, q), root)
-    while wp.bvh_query_next(query, body):
+    world = body_world[own]
+    body = next_in(bodies, world, wp.min(p, q), wp.max(p, q), -1)
+    while body >= 0:
         if body != own:
             piece = first_crossing(surface, body, tris, x, p, q - p)
             if piece.enter.tri >= 0 and piece.leave.tri >= 0:
@@ -110,3 +110,4 @@ def edge_overlaps(
                 if hit.t > overlap[e] and inner_side(hit, tris, x, middle) > 0.0:
                     overlap[e] = hit.t
                     partner[e] = body
+        body = next_in(bodies, world, wp.min(p, q), wp.max(p, q), body)

@@ -1,8 +1,9 @@
 """What forces of one pass share: each contact is given a normal impulse, friction follows from it.
 
-    p_t = -min(mu lambda, |u_t| / W) u_t^         friction, u and W of impulse.py [N s]
+    p_t = -min(mu lambda, |u_t| / W_c) u_t^       friction, W_c of impulse.py [N s]
 
-The vertices receive the couple of friction across a gap as in impulse.py.
+The vertices receive the couple of friction across a gap as in impulse.py; u is the plain relative
+velocity, without the turning.
 """
 
 import warp as wp

@@ -14,7 +14,7 @@ not go through the body.
 
 import warp as wp
 
-from warp_contact.kernels.bounds import GROW
+from warp_contact.kernels.bounds import GROW, next_in
 from warp_contact.kernels.geometry import GROWN, NONE, triangle_closest
 from warp_contact.kernels.surface_query import face_normal
 
@@ -281,10 +281,9 @@ def follow_points(
         sunk = plane_h[m] - body_thickness[own]
         if wp.dot(plane_n[m], p0) >= sunk and wp.dot(plane_n[m], p1) < sunk:
             through = body_world.shape[0] + m
-    body = int(0)
-    root = wp.bvh_get_group_root(bodies, body_world[own])
-    query = wp.bvh_query_aabb(bodies, wp.min(p0, p1), wp.max(p0, p1), root)
-    while wp.bvh_query_next(query, body):
+    world = body_world[own]
+    body = next_in(bodies, world, wp.min(p0, p1), wp.max(p0, p1), -1)
+    while body >= 0:
         if body != own:
             trip = trip_through(surface, body, tris, x0, x1, p0, p1)
             came = trip.came_tri
@@ -310,6 +309,7 @@ def follow_points(
                 elif trip.left_tri < 0:
                     inside = came
                     inside_deep = been
+        body = next_in(bodies, world, wp.min(p0, p1), wp.max(p0, p1), body)
     entered[k] = inside
     deep[k] = inside_deep
     passed[k] = through

@@ -191,7 +191,26 @@ def test_nothing_is_looked_for_where_no_body_is_near(stages, monkeypatch):
         x[model.vert_body.numpy() == 1] += (3.0, 0.0, 1.0)
         state.x.assign(x)
         candidates.refresh(model, state.x, state.x, work)
-        assert c.edges.n.numpy()[0] == 0 and not c.edges.start.numpy().any()
+        for pairs in (c.edges,) if plane else (c.edges, c.verts):
+            assert pairs.n.numpy()[0] == 0
+            assert not pairs.start.numpy().any() and not pairs.item_start.numpy().any()
+        assert plane or c.some.numpy()[0] == 0
+
+
+def test_what_has_become_fast_is_looked_at_anew(stages):
+    scene, dt, v = Scene(), 1e-3, np.array([2.0, 0.0, 0.0])
+    scene.add_body(box(0.1, 2), RUBBER, velocity=v)
+    scene.add_body(box(0.1, 2), RUBBER, (1.0, 0.0, 0.0))
+    model, state, work = stages(scene, dt=dt)
+    x = state.x.numpy()
+    c, own = work.candidates, (model.vert_body.numpy() == 0)[:, None]
+    candidates.refresh(model, state.x, wp.array(x + dt * v * own, dtype=wp.vec3), work)
+    assert c.free.numpy()[0] > 30.0 * dt * v[0]
+    for steps, anew in ((1.5, False), (3.0, True)):  # far less than is free
+        x = x + 1e-4 * own
+        ahead = wp.array(x + steps * dt * v * own, dtype=wp.vec3)
+        candidates.refresh(model, wp.array(x, dtype=wp.vec3), ahead, work)
+        assert np.array_equal(c.x.numpy(), x.astype(np.float32)) == anew
 
 
 def test_hits_are_sorted_by_vertex_and_body_with_planes_last(rng, stages, jittered, turned):

@@ -38,14 +38,17 @@ def test_what_is_more_than_half_full_grows_with_what_did_not_fit(device):
         work.candidates.edges.item_start.numpy()[-1],
     ]
     assert min(used) > 0
+    work.near.tris.zero_()
+    near = work.near.tris.numpy()
+    near[0, 0] = 10, 0.7 * work.capacity.near
+    work.near.tris.assign(near)
+    used.append(near[0, 0][1])
     needed = np.zeros(7, dtype=int)
     needed[0] = work.capacity.contacts + 10
     work.contacts.needed.assign(needed)
-    got = astuple(room.enlarged(work))
-    assert got[0] == 2 * needed[0]
-    for n, have, now in list(zip(used, astuple(work.capacity), got, strict=False))[1:]:
-        assert now == (2 * n if 2 * n > have else have)
-    assert got[6] >= work.capacity.near
+    got, have = astuple(room.enlarged(work)), astuple(work.capacity)
+    assert got[0] == 2 * needed[0] and got[6] == 2 * used[6] and got[1] == have[1] > 2 * used[1]
+    assert got[1:] == tuple(2 * n if 2 * n > h else h for n, h in zip(used, have, strict=True))[1:]
 
 
 def test_lists_that_grow_together_cost_few_frames(device, monkeypatch):

@@ -15,7 +15,7 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     wp.launch(
         candidates.moved,
         dim=model.n_vert,
-        inputs=[model.vert_body, c.free, c.x, x0, x1],
+        inputs=[model.vert_body, c.free, c.skin, c.x, x0, x1],
         outputs=[c.stale],
     )
 

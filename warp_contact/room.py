@@ -23,7 +23,7 @@ def enlarged(work: Work) -> Capacity | None:
 
 
 def _used(work: Work) -> np.ndarray:
-    """What the last step used, in the order of ``Capacity``."""
+    """What the last step used, or the last that used any, in the order of ``Capacity``."""
     verts, edges = work.candidates.verts, work.candidates.edges
     counts = [work.contacts.n, verts.n, verts.item_start[-1:], edges.n, edges.item_start[-1:]]
     contacts, n_vert, n_tet, n_edge, n_tri = (int(n.numpy()[0]) for n in counts)

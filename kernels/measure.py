@@ -61,10 +61,9 @@ def vertex_overlaps(
         if d > overlap[k]:
             overlap[k] = d
             partner[k] = body_edge.shape[0] + m
-    q = int(0)
-    root = wp.bvh_get_group_root(volumes, body_world[vert_body[i]])
-    query = wp.bvh_query_aabb(volumes, p, p, root)
-    while wp.bvh_query_next(query, q):
+    world = body_world[vert_body[i]]
+    q = next_in(volumes, world, p, p, -1)
+    while q >= 0:
         t = tets[q]
         body = vert_body[t[0]]
         if (
@@ -75,6 +74,7 @@ def vertex_overlaps(
             if hit.t > overlap[k]:
                 overlap[k] = hit.t
                 partner[k] = body
+        q = next_in(volumes, world, p, p, q)
 
 
 @wp.kernel

@@ -167,3 +167,35 @@ def test_a_kernel_says_what_a_thread_is(path, kernel):
     of_many = any(argument.arg == "threads" for argument in kernel.args.args)
     start = "For each" if of_many else "One thread"  # launch.py
     assert (ast.get_docstring(kernel) or "").startswith(start)
+
+
+def called(node: ast.AST) -> set[str]:
+    """Names of the functions that are called within a piece of source."""
+    calls = [n.func for n in ast.walk(node) if isinstance(n, ast.Call)]
+    return {f.attr if isinstance(f, ast.Attribute) else getattr(f, "id", "") for f in calls}
+
+
+def test_no_query_begins_before_another_has_ended():
+    """On a GPU all queries of a thread share one stack."""
+    functions = {
+        node.name: node
+        for path in KERNELS
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef)
+    }
+    begin = {"bvh_query_aabb", "bvh_query_ray"}
+    asking: set[str] = set()
+    while True:  # those that ask, and those that call them
+        more = {name for name, node in functions.items() if called(node) & (begin | asking)}
+        if more == asking:
+            break
+        asking = more
+    assert {"first_hit", "closest_hit", "visit_edges"} <= asking
+    loops = 0
+    for name, node in functions.items():
+        for loop in (n for n in ast.walk(node) if isinstance(n, ast.While)):
+            if "bvh_query_next" in called(loop.test):
+                loops += 1
+                inside = set().union(*(called(statement) for statement in loop.body))
+                assert not inside & (begin | asking), name
+    assert loops > 5

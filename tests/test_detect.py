@@ -80,7 +80,7 @@ def test_a_body_near_very_many_others_misses_none(rng, stages, jittered, turned)
     scene = Scene()
     scene.add_body(box((3.0, 3.0, 0.2), (6, 6, 1)), RUBBER)
     for k in range(49):
-        place = (0.4 * (k % 7) - 1.2, 0.4 * (k // 7) - 1.2, rng.uniform(0.1, 0.3))
+        place = (0.4 * (k % 7) - 1.2, 0.4 * (k // 7) - 1.2, rng.uniform(0.1, 0.22))
         scene.add_body(jittered(0.2, 1), RUBBER, place, turned())
     model, state, work = stages(scene)
     pairs = set(found(model, state, work))

@@ -63,7 +63,7 @@ def test_overlap_left_is_the_gap_of_the_records(rng, stages, find_contacts, reco
     np.testing.assert_allclose(c.left[counted], -gap[counted], atol=1e-6)
     np.testing.assert_array_equal(c.left[too_small], 0.0)
     off = np.abs(c.left[counted] - c.depth[counted])
-    # A ray from just inside the body may leave beside that of the vertex, by a tenth in the weights.
+    # A ray from just inside the body may leave beside that of the vertex: a tenth in the weights.
     assert np.median(off) < 1e-5 and off.max() < 0.1 * model.body_edge.numpy().max()
 
 

@@ -135,7 +135,8 @@ def test_near_bodies_have_boxes_that_meet_and_none_that_touches_is_missed(rng, s
     model, state, work = stages(scene)
     candidates.refresh(model, state.x, state.x, work)
     x = state.x.numpy().reshape(20, 8, 3)
-    lo, hi = x.min(axis=1), x.max(axis=1)
+    skin = work.candidates.skin.numpy()[:, None] + 1e-6  # rounding
+    lo, hi = x.min(axis=1) - skin, x.max(axis=1) + skin
     meet = ((lo[:, None] <= hi) & (lo <= hi[:, None])).all(axis=2) & ~np.eye(20, dtype=bool)
     near = np.zeros((20, 20), dtype=bool)
     for body, n in enumerate(work.near.n_near.numpy()):

@@ -14,7 +14,7 @@ import warp as wp
 from warp_contact.kernels.candidates import LEAST
 from warp_contact.kernels.edge_contact import EdgeContact
 from warp_contact.kernels.geometry import lines_closest, projected_weights
-from warp_contact.kernels.impulse import clamped
+from warp_contact.kernels.impulse import turned
 from warp_contact.kernels.opposing import edge_looks, opposes
 from warp_contact.kernels.surface_query import face_normal
 
@@ -142,13 +142,10 @@ def recall(
     """For each contact of an edge: go on from its impulses."""
     for c in range(n_hit[0] + wp.tid(), n_contact[0], threads):
         if weight[c] > 0.0:
-            n = normal[c]
-            p = contact[source[c]].kept
-            rubbed = wp.vec3(p[0], p[1], p[2])
-            rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu[c] * p[3])
+            p = turned(contact[source[c]].kept, normal[c], mu[c])
             lam[c] = p[3]
-            slip[c] = rubbed
-            ahead[c] = wp.vec4(rubbed[0], rubbed[1], rubbed[2], p[3])
+            slip[c] = wp.vec3(p[0], p[1], p[2])
+            ahead[c] = p
 
 
 @wp.kernel

@@ -55,6 +55,14 @@ def clamped(p: wp.vec3, bound: float) -> wp.vec3:
 
 
 @wp.func
+def turned(p: wp.vec4, n: wp.vec3, mu: float) -> wp.vec4:
+    """Friction and normal impulse of the last step where the normal is n now."""
+    rubbed = wp.vec3(p[0], p[1], p[2])
+    rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu * p[3])
+    return wp.vec4(rubbed[0], rubbed[1], rubbed[2], p[3])
+
+
+@wp.func
 def couple_weight(
     c: int,
     vert: wp.array2d[int],

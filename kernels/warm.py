@@ -7,7 +7,7 @@ of edges see held.py.
 
 import warp as wp
 
-from warp_contact.kernels.impulse import clamped
+from warp_contact.kernels.impulse import turned
 
 wp.set_module_options({"enable_backward": False})
 
@@ -46,12 +46,10 @@ def recall(
         n = normal[c]
         i = vert[c, 0]
         if weight[c] > 0.0 and is_first(c, n_hit[0], vert) and partner[i] == pair[c][1]:
-            old = kept[i]
-            rubbed = wp.vec3(old[0], old[1], old[2])
-            rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu[c] * old[3])
+            old = turned(kept[i], n, mu[c])
             lam[c] = old[3]
-            slip[c] = rubbed
-            ahead[c] = wp.vec4(rubbed[0], rubbed[1], rubbed[2], old[3])
+            slip[c] = wp.vec3(old[0], old[1], old[2])
+            ahead[c] = old
         p = lam[c] * n + slip[c]
         for k in range(5):
             part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n

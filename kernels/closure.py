@@ -83,7 +83,7 @@ def begin_closure(
     # in
     threads: int,
     bound: float,  # largest move in a step, in edges
-    deep: float,  # of an edge: an overlap at the start of the step that is left to the search
+    deep: float,  # of an edge: an overlap at the start of the step that is left out
     n_contact: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,)
     body_edge: wp.array[float],  # (n_body,) [m]

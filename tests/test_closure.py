@@ -1,5 +1,7 @@
 """The closure: gaps closed to the resting gap, centres of mass kept, moves bounded."""
 
+import math
+
 import numpy as np
 import pytest
 import warp as wp
@@ -32,7 +34,7 @@ def closed(scene: Scene, stages, find_contacts, records) -> tuple:
     find_contacts(model, work, state.x)
     x0, v0 = state.x.numpy().astype(float), state.v.numpy().astype(float)
     surface.leftover(model, state.x, work)
-    surface.close(model, state.x, state.v, work, search=False)
+    surface.close(model, state.x, state.v, work, math.inf)
     x1, v1 = state.x.numpy().astype(float), state.v.numpy().astype(float)
     return model, (x0, x1), (v0, v1), records(work)
 
@@ -139,7 +141,7 @@ def test_an_overlap_of_before_the_step_is_left_to_the_search(stages, find_contac
     surface.begin_search(model, state.x, work)
     surface.balance(model, state.x, work, ContactSurface())
     found = state.x.numpy().copy()
-    surface.close(model, state.x, state.v, work, search=True)
+    surface.close(model, state.x, state.v, work, surface.DEEP)
     # The closure has nothing to add to what was found.
     np.testing.assert_array_equal(state.x.numpy(), found)
     moves = found[:, 2] - x0[:, 2]

@@ -1,5 +1,6 @@
 """tools/pareto.py: who dominates whom, the rail of failures, the distance of surfaces."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -203,8 +204,25 @@ def test_a_margin_is_an_error_like_an_overlap():
         panel, motion = held(height)
         # Overlaps are measured in float32, on coordinates of ten edges.
         assert panel.error(panel, motion) == pytest.approx(abs(height), abs=1e-5)
-        (overlap,) = panel.also
+        overlap, _ = panel.also
         assert overlap.error(overlap, motion) == pytest.approx(max(-height, 0.0), abs=1e-5)
+
+
+def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
+    from charting import ours, paper
+    from charting.methods import Own
+
+    panel = paper.scene("squeezed_sphere", True)
+    setting = Own("default", "balanced")
+    motion = ours.run(panel, setting, None, np.inf)
+    shown = panel.also[1]
+    # 0.0016 was seen; another machine may round other contacts into being.
+    assert 0.0 < shown.error(shown, motion) < 0.01
+    edges = [paper.edge(body.mesh) for body in panel.scene().bodies]
+    aside = np.array([0.0, 0.1 * np.mean(edges), 0.0])
+    there = replace(motion, x=paper.converged(shown) + aside)
+    # Positions are kept in float32, of bodies ten edges wide.
+    assert shown.error(shown, there) == pytest.approx(0.1, abs=1e-5)
 
 
 def test_bodies_that_went_through_each_other_are_a_failure():

@@ -1,5 +1,6 @@
 """One time step, read from top to bottom."""
 
+import math
 from functools import partial
 
 import warp as wp
@@ -222,18 +223,20 @@ def move_surfaces(
         else:
             surface.balance(model, state.x, work, response)
 
-    def close() -> None:
-        surface.close(model, state.x, state.v, work, search)
+    def close(deep: float) -> None:
+        surface.close(model, state.x, state.v, work, deep)
 
     def resolve() -> None:
         if search:
             wp.capture_if(work.found[1:2], find_surface)
-        close()
+        # What overlapped before the step is the search's. Without one there was none, and a plane
+        # that says so is not where the vertex is: the look that follows may find a better one.
+        close(surface.DEEP)
         # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
         # may cross that it could not see.
         vertex_contacts(model, state.x, state.x, work, not search)
         edge_contacts(model, state.x, state.x, work, not search)
         surface.leftover(model, state.x, work)
-        wp.capture_if(work.found[0:1], close)
+        wp.capture_if(work.found[0:1], partial(close, surface.DEEP if search else math.inf))
 
     wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else resolve)

@@ -115,18 +115,17 @@ def bisect(model: Model, x: wp.array, work: Work, response: ContactSurface) -> N
     _displace(model, x, work)
 
 
-def close(model: Model, x: wp.array, v: wp.array, work: Work, search: bool) -> None:
+def close(model: Model, x: wp.array, v: wp.array, work: Work, deep: float) -> None:
     """Move ``x`` until every colliding vertex lies in the plane of its triangle.
 
-    ``v`` changes only by what keeps the angular momentum. With ``search``, overlaps from before the
-    step are left to it.
+    ``v`` changes only by what keeps the angular momentum. Contacts that overlapped by more than
+    ``deep``, of an edge, when the step began are left out.
     """
     c = work.contacts
     launch_over(
         closure.begin_closure,
         work.capacity.contacts,
-        inputs=[BOUND, DEEP if search else math.inf, c.n, c.pair, model.body_edge]
-        + [c.closing, work.dt, c.left],
+        inputs=[BOUND, deep, c.n, c.pair, model.body_edge] + [c.closing, work.dt, c.left],
         outputs=[c.slack, c.push],
     )
 

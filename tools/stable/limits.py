@@ -90,13 +90,18 @@ def balls(count: int) -> Setting:
 
 
 def deep(part: float, aside: float = 0.0) -> Setting:
-    """Two cubes start in each other."""
+    """Two cubes start in each other.
+
+    With the overlap closed and the far faces where they are, each is shorter by half of it. Hooke's
+    law for the columns that meet, cut free from the rest, bounds that energy from below.
+    """
     scene = wc.Scene(NONE, friction=0.0)
     for k in range(2):
         place = k * aside, k * aside, k * (1.0 - part) * EDGE
         scene.add_body(wc.box(EDGE, 2 + k), soft(YOUNG), place)
     pairs = ((0, 1, UP),) if part < 0.5 else ()  # beyond, no side is the right one
-    return Setting(scene, 1.0, FINE_FPS, pairs=pairs, recovers=True)
+    held = YOUNG * (0.5 * part) ** 2 * (EDGE - aside) ** 2 * EDGE
+    return Setting(scene, 1.0, FINE_FPS, pairs=pairs, recovers=True, held=held)
 
 
 def plate(overlap: float) -> Setting:

@@ -7,8 +7,9 @@ has gone through the other rather than past it.
 The rise of the energy is measured against that of the start, kinetic and elastic, plus the weights
 times the smallest extent of a body, plus ``FLOOR`` times E V, below which all is rounding. Bodies
 that start in each other hold an energy that no one knows until they are apart. What they must not
-do is pop: there, the kinetic energy of their centres of mass may not pass the largest elastic
-energy, and by how much it does, over that, stands for the rise.
+do is pop: there, the kinetic energy of their centres of mass may not pass the elastic energy, the
+largest that was seen or what the overlap would hold if it were closed at once, and by how much it
+does, over that, stands for the rise.
 """
 
 import signal
@@ -38,6 +39,7 @@ class Setting:
         pairs: indices of two bodies, and the direction from the first to the second or None for
             the line between their centres; None watches each body and the next
         recovers: it starts with an overlap; only that at the end counts, and no body may pop
+        held: lower bound of the elastic energy with that overlap closed before anything moves [J]
         drive: called before each frame; the energy is then not judged
     """
 
@@ -47,6 +49,7 @@ class Setting:
     substeps: int | None = None
     pairs: tuple | None = None
     recovers: bool = False
+    held: float = 0.0
     drive: Callable | None = None
 
 
@@ -72,7 +75,7 @@ class Watch:
         start = sim.measure()
         self._start, self.record.touched = start.energy, start.overlap > 0.0
         self._scale = self.scale()
-        self._flight = self._elastic = 0.0
+        self._flight, self._elastic = 0.0, setting.held
 
     def scale(self) -> float:
         """What the energy is measured against [J]."""

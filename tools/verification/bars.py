@@ -11,11 +11,11 @@ these buckle under the strain of a third that Doyen's numbers mean.
 
 When unequal bars part is decided by waves that have been through them several times, smeared out by
 the lumped mesh on the way. The same in exact contact on the same mesh, shown beside it, tells what
-of the error is due to the contact.
+of the error is due to the contact; four times as many elements leave a part of it.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -118,7 +118,10 @@ IMPACTS = {
     "E2 = 16 E1": Impact(Bar(*FIRST), Bar(1.0, 16e6, 1000.0, 0.0), ROUND, 0.7408, 0.6**3),
     "z1 = z2": Impact(Bar(*FIRST), Bar(1.0, 4e6, 250.0, 0.0), 0.25 * ROUND, 0.25),
 }
-ELEMENTS = 40  # along a bar of length L1; levels are judged there
+ELEMENTS = 40  # along a bar of length L1
+# In cells of 6 mm single precision of positions of 2 m strains by 2e-5. At a strain of 0.3 % that
+# adds up to 1 to 11 % of the energy in the 5000 steps of an impact; at 3 % the longest bar buckles.
+UNEQUAL, FINE, FASTER = ("L2 = 2 L1", "E2 = 16 E1"), 160, 5
 
 
 def run(ask: Ask) -> Iterator[Figure]:
@@ -128,7 +131,16 @@ def run(ask: Ask) -> Iterator[Figure]:
     if not ask.quick:
         for n in (10, 160):
             yield from hit(f"A4 on a wall, N = {n}", IMPACTS["on a wall"], ask, n)
+        for name in UNEQUAL:
+            label = f"A4 {name}, N = {FINE}, {FASTER} times as fast"
+            yield from hit(label, faster(IMPACTS[name]), ask, FINE)
         yield from hit("A4 identical, 40, 2:3 across", IMPACTS["identical"], ask, 40, (2, 3))
+
+
+def faster(impact: Impact) -> Impact:
+    """The same at ``FASTER`` times the speed."""
+    lower, upper = (replace(b, speed=FASTER * b.speed) for b in (impact.lower, impact.upper))
+    return replace(impact, lower=lower, upper=upper)
 
 
 def build(impact: Impact, n: int, across: tuple[int, int]) -> wc.Scene:

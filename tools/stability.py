@@ -23,6 +23,7 @@ FAMILIES = {
     "ratios": "B3 mass and stiffness ratios",
     "figures": "B4 to B7 the scenes of the paper",
     "primitives": "B2 primitive pairs",
+    "tilts": "B2 blocks at random tilts",
     "spikes": "B1 spikes, wedges, edges, holes",
     "degenerate": "B11 degenerate input",
 }

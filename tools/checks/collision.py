@@ -5,7 +5,7 @@ setting is rotated, which should change nothing; in "tilted" ones the second blo
 then hits with a corner.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -73,12 +73,20 @@ def run(quick: bool) -> Iterator[Row]:
         yield Row("collision, worst", figure, value, TARGETS[figure])
 
 
-def build(a: int, b: int, ratio: float, place: str, friction: float = 0.0) -> wc.Scene:
+def build(
+    a: int,
+    b: int,
+    ratio: float,
+    place: str,
+    friction: float = 0.0,
+    angles: Sequence[float] = ANGLES,
+    shift: np.ndarray = SHIFT,
+) -> wc.Scene:
     """Blocks of a and b cells along an edge, the second ``ratio`` times as stiff."""
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=friction)
     soft = wc.NeoHookean(YOUNG, POISSON, DENSITY)
     stiff = wc.NeoHookean(ratio * YOUNG, POISSON, DENSITY)
-    q = quaternion(ANGLES)
+    q = quaternion(angles)
     whole = rotation_matrix(q) if "turned" in place else np.eye(3)
     turn = q if "turned" in place else (0.0, 0.0, 0.0, 1.0)
     other = q if "tilted" in place else turn
@@ -86,7 +94,7 @@ def build(a: int, b: int, ratio: float, place: str, friction: float = 0.0) -> wc
     low = (upper.vertices @ rotation_matrix(other).T @ whole)[:, 2].min()
     away = np.array([0.0, 0.0, 0.5 * EDGE + GAP - low])
     if "shifted" in place:
-        away += SHIFT
+        away += shift
     v = whole @ [0.0, 0.0, 0.5 * SPEED]
     scene.add_body(wc.box(EDGE, a), soft, -0.5 * whole @ away, turn, v, label="first")
     scene.add_body(upper, stiff, 0.5 * whole @ away, other, -v, label="second")

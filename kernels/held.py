@@ -132,6 +132,7 @@ def recall(
     normal: wp.array[wp.vec3],  # (capacity,)
     weight: wp.array[float],  # (capacity,) [1/kg]
     mu: wp.array[float],  # (capacity,)
+    ramp: wp.array[wp.vec3],  # (capacity,)
     source: wp.array[int],  # (capacity,)
     contact: wp.array[EdgeContact],  # (contacts,)
     # out
@@ -142,7 +143,7 @@ def recall(
     """For each contact of an edge: go on from its impulses."""
     for c in range(n_hit[0] + wp.tid(), n_contact[0], threads):
         if weight[c] > 0.0:
-            p = turned(contact[source[c]].kept, normal[c], mu[c])
+            p = turned(contact[source[c]].kept, normal[c], mu[c], ramp[c])
             lam[c] = p[3]
             slip[c] = wp.vec3(p[0], p[1], p[2])
             ahead[c] = p

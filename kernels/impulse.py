@@ -28,6 +28,16 @@ A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
 
 Across a gap that is too wide for the surface to take the couple there is no friction in this step.
 
+Where a vertex meets a facet, n is the direction of stage 2, smooth over many facets, and the facet
+may lean away from it. A vertex that slides up such a ramp goes into the facet although u . n = 0,
+and what the closure lifts it out by would be energy from nothing. Without friction the facet pushes
+along its own normal, so the tangential impulse may also point down the ramp,
+
+    t = n_f / (n . n_f) - n
+    p_t = s t + r,   0 <= s <= lambda,  |r| <= mu lambda       nearest to p_t - u_t / W_c
+
+which stops the climb and, as it acts against the motion, adds no energy.
+
 Sweep j runs from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
 method, except at a contact where that change was a step too far. The last sweep is a plain one.
 Most contacts are soon done, and few clusters last long: between the first and the last sweep a
@@ -42,6 +52,8 @@ from warp_contact.kernels.incidence import takes_part, total
 wp.set_module_options({"enable_backward": False})
 
 TURN = wp.constant(0.1)  # gap times gradient above which a surface cannot take the couple
+UPRIGHT = wp.constant(0.85)  # n . n_f below which a facet is another side of a rim, not a ramp
+LEVEL = wp.constant(1.0e-3)  # slope below which it is none, but rounding
 STEEP = wp.constant(8.0)  # gradient times edge of a triangle too thin or too tilted for it
 
 
@@ -55,11 +67,40 @@ def clamped(p: wp.vec3, bound: float) -> wp.vec3:
 
 
 @wp.func
-def turned(p: wp.vec4, n: wp.vec3, mu: float) -> wp.vec4:
-    """Friction and normal impulse of the last step where the normal is n now."""
-    rubbed = wp.vec3(p[0], p[1], p[2])
-    rubbed = clamped(rubbed - wp.dot(rubbed, n) * n, mu * p[3])
-    return wp.vec4(rubbed[0], rubbed[1], rubbed[2], p[3])
+def allowed(p: wp.vec3, lam: float, mu: float, ramp: wp.vec3) -> wp.vec3:
+    """Of the tangential impulses that a normal one of lam allows, the nearest to p."""
+    steep = wp.length_sq(ramp)
+    if steep == 0.0:
+        return clamped(p, mu * lam)
+    up = wp.clamp(wp.dot(p, ramp) / steep, 0.0, lam) * ramp
+    return up + clamped(p - up, mu * lam)
+
+
+@wp.func
+def turned(p: wp.vec4, n: wp.vec3, mu: float, ramp: wp.vec3) -> wp.vec4:
+    """Tangential and normal impulse of the last step where the normal is n now."""
+    along = wp.vec3(p[0], p[1], p[2])
+    along = allowed(along - wp.dot(along, n) * n, p[3], mu, ramp)
+    return wp.vec4(along[0], along[1], along[2], p[3])
+
+
+@wp.func
+def slope(
+    c: int, vert: wp.array2d[int], coef: wp.array2d[float], n: wp.vec3, x: wp.array[wp.vec3]
+) -> wp.vec3:
+    """The ramp t of contact c of a vertex with a triangle; 0 for others."""
+    none = wp.vec3(0.0, 0.0, 0.0)
+    if coef[c, 0] != 1.0:
+        return none
+    a = x[vert[c, 2]]
+    face = wp.normalize(wp.cross(x[vert[c, 3]] - a, x[vert[c, 4]] - a))
+    upright = wp.dot(face, n)
+    if upright < UPRIGHT:
+        return none
+    ramp = face / upright - n
+    if wp.length_sq(ramp) < LEVEL * LEVEL:
+        return none
+    return ramp
 
 
 @wp.func
@@ -108,6 +149,7 @@ def begin_contacts(
     open: wp.array[float],  # (capacity,) [m] g0, 0 where no surface can take the couple
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m] b_k
     mu: wp.array[float],  # (capacity,) coefficient of friction, 0 across a gap that is too wide
+    ramp: wp.array[wp.vec3],  # (capacity,) t, 0 where the facet does not lean
     lam: wp.array[float],  # (capacity,) [N s]
     slip: wp.array[wp.vec3],  # (capacity,) [N s]
     ahead: wp.array[wp.vec4],  # (capacity,) [N s]
@@ -135,11 +177,15 @@ def begin_contacts(
             for k in range(5):
                 turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
         mu[c] = friction
+        ramp[c] = wp.vec3(0.0, 0.0, 0.0)
+        if w > 0.0 and not on_plane:
+            ramp[c] = slope(c, vert, coef, normal[c], x0)
         if largest * wp.abs(g) > TURN or on_plane:
             open[c] = 0.0
             if not on_plane:
                 mu[c] = 0.0
-        if mu[c] > 0.0 and open[c] != 0.0:
+                ramp[c] = wp.vec3(0.0, 0.0, 0.0)
+        if open[c] != 0.0 and (mu[c] > 0.0 or wp.length_sq(ramp[c]) > 0.0):
             coupled[c] = w + couple_weight(c, vert, coef, start, inv_mass, open, turn)
         if c >= first[0]:
             lam[c] = 0.0
@@ -194,6 +240,7 @@ def solve_contacts(
     open: wp.array[float],  # (capacity,) [m]
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
     mu: wp.array[float],  # (capacity,)
+    ramp: wp.array[wp.vec3],  # (capacity,)
     stirred: wp.array[int],  # (n_vert,) the last sweep if it changed the velocity
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     last: bool,  # leave the impulses where this sweep projects them
@@ -224,11 +271,12 @@ def solve_contacts(
                 part[5 * c + k] = wp.vec3(0.0, 0.0, 0.0)
             continue
         n = normal[c]
+        rubs = mu[c] > 0.0 or wp.length_sq(ramp[c]) > 0.0
         u = wp.vec3(0.0, 0.0, 0.0)
         for k in range(5):
             w = v[vert[c, k]]
             u += coef[c, k] * w
-            if mu[c] > 0.0:
+            if rubs:
                 u += open[c] * wp.dot(n, w) * turn[c, k]
         un = wp.dot(u, n)
         excess = un + wp.max(closing[c], 0.0)
@@ -239,8 +287,8 @@ def solve_contacts(
         if off * dt[0] > tolerance * body_edge[pair[c][0]] and sweep < sweeps:
             again[0] = 1
         new_slip = wp.vec3(0.0, 0.0, 0.0)
-        if mu[c] > 0.0:
-            new_slip = clamped(yt - (u - un * n) / coupled[c], mu[c] * new_lam)
+        if rubs:
+            new_slip = allowed(yt - (u - un * n) / coupled[c], new_lam, mu[c], ramp[c])
         beta = float(0.0)
         if not last:
             beta = float(sweep - 1) / float(sweep + 2)

@@ -32,6 +32,7 @@ def recall(
     open: wp.array[float],  # (capacity,) [m]
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
     mu: wp.array[float],  # (capacity,)
+    ramp: wp.array[wp.vec3],  # (capacity,)
     partner: wp.array[int],  # (n_vert,) body of the first contact in the last step, or -1
     kept: wp.array[wp.vec4],  # (n_vert,) [N s] its friction and normal impulse
     # in, out
@@ -46,7 +47,7 @@ def recall(
         n = normal[c]
         i = vert[c, 0]
         if weight[c] > 0.0 and is_first(c, n_hit[0], vert) and partner[i] == pair[c][1]:
-            old = turned(kept[i], n, mu[c])
+            old = turned(kept[i], n, mu[c], ramp[c])
             lam[c] = old[3]
             slip[c] = wp.vec3(old[0], old[1], old[2])
             ahead[c] = old

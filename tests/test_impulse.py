@@ -106,23 +106,43 @@ def test_the_couple_of_friction_adds_no_energy_to_a_light_corner(stages, find_co
     assert after <= (1.0 + 1e-5) * before  # rounding; with W alone it is 1e25 times
 
 
+def rubbed(c) -> tuple[np.ndarray, np.ndarray]:
+    """Tangential impulses, split into the parts along the ramps over ``lam``, and friction."""
+    steep = np.einsum("ci,ci->c", c.ramp, c.ramp)
+    along = np.einsum("ci,ci->c", c.slip, c.ramp) / np.where(steep > 0.0, steep, 1.0)
+    s = np.clip(along, 0.0, c.lam)
+    return s, c.slip - s[:, None] * c.ramp
+
+
 def test_friction_stays_in_the_cone_and_normal_impulses_push(
     rng, stages, find_contacts, records, jittered
 ):
     _, _, _, _, c = exchanged(meeting(rng, jittered, 0.4), stages, find_contacts, records)
     assert (c.lam >= 0.0).all() and (np.linalg.norm(c.slip, axis=1) > 0.0).any()
-    # Three roundings.
-    assert (np.linalg.norm(c.slip, axis=1) <= 0.4 * (1.0 + 1e-6) * c.lam).all()
+    # Rounding of the terms of the differences.
+    room = 0.4 * c.lam + 1e-6 * (c.lam + np.linalg.norm(c.slip, axis=1))
+    assert (np.linalg.norm(rubbed(c)[1], axis=1) <= room).all()
     np.testing.assert_allclose(
         np.einsum("ci,ci->c", c.slip, c.normal), 0.0, atol=1e-5 * np.abs(c.slip).max()
     )
 
 
-def test_without_friction_impulses_are_along_the_normals(
+def test_without_friction_impulses_are_between_the_normals_and_those_of_the_facets(
     rng, stages, find_contacts, records, jittered
 ):
-    _, _, _, _, c = exchanged(meeting(rng, jittered, 0.0), stages, find_contacts, records)
-    np.testing.assert_array_equal(c.slip, 0.0)
+    scene = meeting(rng, jittered, 0.0)
+    _, x0, _, _, c = exchanged(scene, stages, find_contacts, records, edges=False)
+    s, left = rubbed(c)
+    assert (s > 0.0).any()
+    # Rounding.
+    np.testing.assert_allclose(left, 0.0, atol=1e-6 * c.lam.max())
+    used = np.linalg.norm(c.ramp, axis=1) > 0.0
+    a, b, d = np.moveaxis(x0[c.vert[used, 2:]], 1, 0)
+    facet = np.cross(b - a, d - a)
+    facet /= np.linalg.norm(facet, axis=1)[:, None]
+    whole = c.normal[used] + c.ramp[used]
+    whole /= np.linalg.norm(whole, axis=1)[:, None]
+    np.testing.assert_allclose(whole, facet, atol=1e-5)  # float32
 
 
 def test_no_contact_approaches_further_than_its_gap(rng, stages, find_contacts, records, jittered):

@@ -10,7 +10,18 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
-from stable import chart, degenerate, figures, limits, outcome, paper, primitives, speed, sweeps
+from stable import (
+    chart,
+    degenerate,
+    figures,
+    limits,
+    outcome,
+    paper,
+    primitives,
+    speed,
+    sweeps,
+    tilts,
+)
 from stable.outcome import Record, classify, level
 from stable.setup import METHODS, attempt, response
 from stable.watch import Setting, Watch
@@ -36,6 +47,7 @@ CASES = {
     "cube on one large facet": partial(limits.facet, False),
     "20 plates a frame": partial(speed.through, 20.0, None),
     "ball of 67 m/s": partial(speed.golf, 41, 67.0),
+    "corner that slides up a bent face": partial(tilts.collide, 47),
     "tet in a slot": partial(primitives.slot, 5e-7),
     "faces at distance zero": degenerate.pair,
     "three cubes on a membrane": partial(figures.membrane, 0.2),

@@ -21,7 +21,8 @@ def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
         work.capacity.contacts,
         inputs=[model.friction, first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
         + [model.inv_mass, model.body_edge, work.dt, x0],
-        outputs=[c.weight, c.coupled, c.closing, c.open, c.turn, c.mu, c.lam, c.slip, c.ahead],
+        outputs=[c.weight, c.coupled, c.closing, c.open, c.turn, c.mu, c.ramp]
+        + [c.lam, c.slip, c.ahead],
     )
 
 
@@ -33,7 +34,7 @@ def recall(model: Model, v: wp.array, work: Work) -> None:
         warm.recall,
         work.capacity.contacts,
         inputs=[work.n_hit, c.n, c.vert, c.coef, c.normal, c.pair, c.weight]
-        + [c.open, c.turn, c.mu, work.warm.partner, work.warm.kept],
+        + [c.open, c.turn, c.mu, c.ramp, work.warm.partner, work.warm.kept],
         outputs=[c.lam, c.slip, c.ahead, c.part],
     )
     _apply(model, v, work)
@@ -45,7 +46,7 @@ def recall_edges(work: Work) -> None:
     launch_over(
         held.recall,
         work.capacity.contacts,
-        inputs=[work.n_hit, c.n, c.normal, c.weight, c.mu, work.source, work.crossing],
+        inputs=[work.n_hit, c.n, c.normal, c.weight, c.mu, c.ramp, work.source, work.crossing],
         outputs=[c.lam, c.slip, c.ahead],
     )
 
@@ -98,7 +99,7 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
             work.capacity.contacts,
             inputs=[TOLERANCE, _little(work), SWEEPS, work.dt, model.body_edge, c.pair, work.done]
             + [c.n, c.vert, c.coef, c.normal, c.coupled, c.closing, c.open, c.turn]
-            + [c.mu, work.stirred, v, last],
+            + [c.mu, c.ramp, work.stirred, v, last],
             outputs=[c.lam, c.slip, c.ahead, c.busy, c.part, work.served, work.again],
         )
         _apply(model, v, work, swept=True)

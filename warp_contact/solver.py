@@ -12,8 +12,6 @@ from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.types import Model, State
 from warp_contact.work import Work
 
-LOOKS = 2  # after the closure, at most, beyond the first: where it found a deep overlap
-
 
 def step(
     model: Model,
@@ -228,14 +226,6 @@ def move_surfaces(
     def close(deep: float) -> None:
         surface.close(model, state.x, state.v, work, deep)
 
-    def look(more: int) -> None:
-        vertex_contacts(model, state.x, state.x, work, not search)
-        edge_contacts(model, state.x, state.x, work, not search)
-        surface.leftover(model, state.x, work)
-        wp.capture_if(work.found[0:1], partial(close, surface.DEEP if search else math.inf))
-        if more > 0:
-            wp.capture_if(work.found[1:2], partial(look, more - 1))
-
     def resolve() -> None:
         if search:
             wp.capture_if(work.found[1:2], find_surface)
@@ -243,8 +233,10 @@ def move_surfaces(
         # that says so is not where the vertex is: the look that follows may find a better one.
         close(surface.DEEP)
         # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
-        # may cross that it could not see. Deep ones slide while they are closed: they are looked at
-        # once more.
-        look(0 if search else LOOKS)
+        # may cross that it could not see.
+        vertex_contacts(model, state.x, state.x, work, not search)
+        edge_contacts(model, state.x, state.x, work, not search)
+        surface.leftover(model, state.x, work)
+        wp.capture_if(work.found[0:1], partial(close, surface.DEEP if search else math.inf))
 
     wp.capture_if(work.found[0:1], find_surface if response.search == "literal" else resolve)

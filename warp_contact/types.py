@@ -238,9 +238,10 @@ class Contacts:
         open: gap at the start of the step [m], shape (capacity,)
         turn: how couples are handed to the vertices [1/m], shape (capacity, 5)
         lam: normal impulse of the step [N s], shape (capacity,)
-        slip: friction impulse of the step [N s], shape (capacity,)
+        slip: tangential impulse of the step [N s], shape (capacity,)
         ahead: extrapolated friction and normal impulse [N s], shape (capacity,)
         mu: coefficient of friction, 0 across a wide gap, shape (capacity,)
+        ramp: how a facet leans away from the normal, 0 where it does not, shape (capacity,)
         busy: 2 where the last sweep changed the impulses, 1 a little, 0 where it left them alone,
             shape (capacity,)
         part: what the last sweep adds at each vertex [N s], shape (5 capacity,)
@@ -270,6 +271,7 @@ class Contacts:
     slip: wp.array
     ahead: wp.array
     mu: wp.array
+    ramp: wp.array
     busy: wp.array
     part: wp.array
     left: wp.array

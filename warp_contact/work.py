@@ -303,6 +303,7 @@ def _allocate_contacts(n: int, m: int) -> Contacts:
         slip=_vectors(m),
         ahead=wp.zeros(m, dtype=wp.vec4),
         mu=_floats(m),
+        ramp=_vectors(m),
         part=_vectors(5 * m),
         busy=_ints(m),
         left=_floats(m),

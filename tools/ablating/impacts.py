@@ -1,8 +1,10 @@
 """Cases in which bodies strike each other."""
 
+from functools import partial
+
 import numpy as np
 from checks import collision
-from stable import limits
+from stable import limits, tilts
 from stable.setup import attempt
 from verification import collision as free
 from verification.setup import Ask
@@ -45,8 +47,22 @@ def fine() -> dict[str, float]:
 
 def balls() -> dict[str, float]:
     """Balls of 147 vertices, one falls on the other."""
-    case = next(c for c in limits.cases(False) if "147 vertices" in c.name)
-    return {GAINED: max(attempt(case.build, "surface", limit=case.limit).gained, 0.0)}
+    return gained(partial(limits.balls, 147))
+
+
+def gained(build) -> dict[str, float]:
+    """Energy of a stability case."""
+    return {GAINED: max(attempt(build, "surface").gained, 0.0)}
+
+
+def bent() -> dict[str, float]:
+    """Corner that slides up a bent face."""
+    return gained(partial(tilts.collide, 47))
+
+
+def seam() -> dict[str, float]:
+    """Corner on the seam of two cubes with a gap."""
+    return gained(partial(limits.seam, 1e-3))
 
 
 def corner() -> dict[str, float]:

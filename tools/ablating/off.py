@@ -81,6 +81,17 @@ def straight(model, x0, work, first, begin=impulse.begin) -> None:
     work.contacts.open.zero_()
 
 
+def level(model, x0, work, first, begin=impulse.begin) -> None:
+    """In the place of ``impulse.begin``: no facet leans."""
+    begin(model, x0, work, first)
+    work.contacts.ramp.zero_()
+
+
+def all_planes(model, x, v, work, deep, close=surface.close) -> None:
+    """In the place of ``surface.close``: planes behind which a vertex was are used as well."""
+    close(model, x, v, work, math.inf)
+
+
 def uncoupled(model, x0, work, first, begin=impulse.begin) -> None:
     """In the place of ``impulse.begin``: the sweeps do not count on what the couple moves."""
     begin(model, x0, work, first)

@@ -115,6 +115,20 @@ PARTS = {
         impacts.GAINED,
         GAIN,
     ),
+    "ramp": Part(
+        "ramps of facets",
+        without(impulse, "begin", off.level),
+        impacts.bent,
+        impacts.GAINED,
+        GAIN,
+    ),
+    "planes": Part(
+        "planes that the closure leaves out",
+        without(surface, "close", off.all_planes),
+        impacts.seam,
+        impacts.GAINED,
+        GAIN,
+    ),
     "warm": Part(
         "start from the last impulses",
         without(impulse, "recall", off.nothing),

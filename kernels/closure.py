@@ -7,7 +7,8 @@ With W of impulse.py,
 
 The mobility is 1 / m, so the centre of mass of a contact stays where it is. Eq. (1) alone leaves
 25 to 38 % of an overlap between a vertex and the middle of a triangle. An overlap that was there
-when the step began is left to the search, which knows better than the masses who should yield.
+when the step began is left to the search, which knows better than the masses who should yield; in a
+step without one it is looked at again first.
 
 A move p n of a pair that slides by u_t changes the angular momentum by p n x u_t. It is handed back
 to the velocities as the couple of impulse.py, dv_k = (b_k . p u_t) n / m_k.

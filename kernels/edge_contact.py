@@ -75,7 +75,7 @@ class EdgeContact:
     edge: int  # its own
     body: int  # the other one
     next: int  # place of another contact of the same two, -1 for none
-    kept: wp.vec4  # [N s] friction and normal impulse so far
+    kept: wp.vec4  # [N s] tangential and normal impulse so far
 
 
 @wp.func

@@ -132,7 +132,6 @@ def recall(
     normal: wp.array[wp.vec3],  # (capacity,)
     weight: wp.array[float],  # (capacity,) [1/kg]
     mu: wp.array[float],  # (capacity,)
-    ramp: wp.array[wp.vec3],  # (capacity,)
     source: wp.array[int],  # (capacity,)
     contact: wp.array[EdgeContact],  # (contacts,)
     # out
@@ -143,7 +142,7 @@ def recall(
     """For each contact of an edge: go on from its impulses."""
     for c in range(n_hit[0] + wp.tid(), n_contact[0], threads):
         if weight[c] > 0.0:
-            p = turned(contact[source[c]].kept, normal[c], mu[c], ramp[c])
+            p = turned(contact[source[c]].kept, normal[c], mu[c], wp.vec3(0.0, 0.0, 0.0))
             lam[c] = p[3]
             slip[c] = wp.vec3(p[0], p[1], p[2])
             ahead[c] = p

@@ -30,13 +30,14 @@ Across a gap that is too wide for the surface to take the couple there is no fri
 
 Where a vertex meets a facet, n is the direction of stage 2, smooth over many facets, and the facet
 may lean away from it. A vertex that slides up such a ramp goes into the facet although u . n = 0,
-and what the closure lifts it out by would be energy from nothing. Without friction the facet pushes
-along its own normal, so the tangential impulse may also point down the ramp,
+and what the closure lifts it out by would be energy from nothing. The facet itself would push along
+its normal n_f, at x0, so that the tangential impulse may point down the ramp as well,
 
     t = n_f / (n . n_f) - n
     p_t = s t + r,   0 <= s <= lambda,  |r| <= mu lambda       nearest to p_t - u_t / W_c
 
-which stops the climb and, as it acts against the motion, adds no energy.
+which stops the climb and, as it acts against the motion, adds no energy. At s = lambda the whole
+pushes along n_f. There is no ramp where friction is left out, nor where a rim is too sharp for one.
 
 Sweep j runs from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
 method, except at a contact where that change was a step too far. The last sweep is a plain one.
@@ -85,12 +86,10 @@ def turned(p: wp.vec4, n: wp.vec3, mu: float, ramp: wp.vec3) -> wp.vec4:
 
 
 @wp.func
-def slope(
-    c: int, vert: wp.array2d[int], coef: wp.array2d[float], n: wp.vec3, x: wp.array[wp.vec3]
-) -> wp.vec3:
+def slope(c: int, vert: wp.array2d[int], n: wp.vec3, x: wp.array[wp.vec3]) -> wp.vec3:
     """The ramp t of contact c of a vertex with a triangle; 0 for others."""
     none = wp.vec3(0.0, 0.0, 0.0)
-    if coef[c, 0] != 1.0:
+    if vert[c, 1] != vert[c, 0]:  # an edge
         return none
     a = x[vert[c, 2]]
     face = wp.normalize(wp.cross(x[vert[c, 3]] - a, x[vert[c, 4]] - a))
@@ -173,13 +172,13 @@ def begin_contacts(
             if w > 0.0 and not on_plane:
                 turn[c, k] = gradient(k, c, vert, normal[c], x0)
                 largest = wp.max(largest, wp.length(turn[c, k]))
+        mu[c] = friction
+        ramp[c] = wp.vec3(0.0, 0.0, 0.0)
         if largest * body_edge[pair[c][0]] > STEEP:
             for k in range(5):
                 turn[c, k] = wp.vec3(0.0, 0.0, 0.0)
-        mu[c] = friction
-        ramp[c] = wp.vec3(0.0, 0.0, 0.0)
-        if w > 0.0 and not on_plane:
-            ramp[c] = slope(c, vert, coef, normal[c], x0)
+        elif w > 0.0 and not on_plane:
+            ramp[c] = slope(c, vert, normal[c], x0)
         if largest * wp.abs(g) > TURN or on_plane:
             open[c] = 0.0
             if not on_plane:
@@ -246,8 +245,8 @@ def solve_contacts(
     last: bool,  # leave the impulses where this sweep projects them
     # in, out
     lam: wp.array[float],  # (capacity,) [N s] accumulated normal impulse
-    slip: wp.array[wp.vec3],  # (capacity,) [N s] accumulated friction impulse
-    ahead: wp.array[wp.vec4],  # (capacity,) [N s] extrapolated friction and normal impulse, in v
+    slip: wp.array[wp.vec3],  # (capacity,) [N s] accumulated tangential impulse
+    ahead: wp.array[wp.vec4],  # (capacity,) [N s] extrapolated tangential and normal impulse, in v
     busy: wp.array[int],  # (capacity,) 2 when this sweep changed the impulses, 1 little, 0 not
     # out
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] what this sweep adds at each vertex

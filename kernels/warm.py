@@ -34,7 +34,7 @@ def recall(
     mu: wp.array[float],  # (capacity,)
     ramp: wp.array[wp.vec3],  # (capacity,)
     partner: wp.array[int],  # (n_vert,) body of the first contact in the last step, or -1
-    kept: wp.array[wp.vec4],  # (n_vert,) [N s] its friction and normal impulse
+    kept: wp.array[wp.vec4],  # (n_vert,) [N s] its tangential and normal impulse
     # in, out
     lam: wp.array[float],  # (capacity,) [N s]
     slip: wp.array[wp.vec3],  # (capacity,) [N s]

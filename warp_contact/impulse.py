@@ -46,7 +46,7 @@ def recall_edges(work: Work) -> None:
     launch_over(
         held.recall,
         work.capacity.contacts,
-        inputs=[work.n_hit, c.n, c.normal, c.weight, c.mu, c.ramp, work.source, work.crossing],
+        inputs=[work.n_hit, c.n, c.normal, c.weight, c.mu, work.source, work.crossing],
         outputs=[c.lam, c.slip, c.ahead],
     )
 

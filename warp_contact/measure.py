@@ -24,7 +24,7 @@ class Measure:
             of half a step earlier, so h/2 times the power of internal forces and gravity is added.
             The sum of all energies is then constant where a linear material flies freely, and a
             contact impulse p changes it by p . (v + v') / 2, v and v' the velocities before and
-            after the step: one that stays closed does not
+            after the step: not at all while the contact stays closed
         elastic: energy [J]
         gravitational: energy against the origin [J]
         momentum: [kg m/s], shape (3,)

@@ -229,8 +229,8 @@ def move_surfaces(
     def resolve() -> None:
         if search:
             wp.capture_if(work.found[1:2], find_surface)
-        # What overlapped before the step is the search's. Without one there was none, and a plane
-        # that says so is not where the vertex is: the look that follows may find a better one.
+        # What overlapped before the step is the search's. In a step without one, no overlap can be
+        # that old: the plane is a wrong one, and the look that follows may find a better one.
         close(surface.DEEP)
         # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
         # may cross that it could not see.

@@ -239,7 +239,7 @@ class Contacts:
         turn: how couples are handed to the vertices [1/m], shape (capacity, 5)
         lam: normal impulse of the step [N s], shape (capacity,)
         slip: tangential impulse of the step [N s], shape (capacity,)
-        ahead: extrapolated friction and normal impulse [N s], shape (capacity,)
+        ahead: extrapolated tangential and normal impulse [N s], shape (capacity,)
         mu: coefficient of friction, 0 across a wide gap, shape (capacity,)
         ramp: how a facet leans away from the normal, 0 where it does not, shape (capacity,)
         busy: 2 where the last sweep changed the impulses, 1 a little, 0 where it left them alone,

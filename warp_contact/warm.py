@@ -14,7 +14,7 @@ class Warm:
 
     Attributes:
         partner: body of each vertex' first contact in the last step, -1 for none, shape (n_vert,)
-        kept: friction and normal impulse of that contact [N s], shape (n_vert,)
+        kept: tangential and normal impulse of that contact [N s], shape (n_vert,)
         n_held: contacts of edges in the last step, shape (1,)
         held: these, with their impulses, sorted by edge and body, shape (capacity.contacts,)
     """

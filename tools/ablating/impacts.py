@@ -12,6 +12,7 @@ from verification.setup import Ask
 import warp_contact as wc
 
 OVERLAP = "deepest overlap [% of an edge]"
+MEDIAN = "deepest overlap, median [% of an edge]"
 SPIN = "angular momentum [of sum m |x| |v|]"
 GAINED = "energy gained [of that at the start]"
 APPROACH = "approach left [of that before]"
@@ -39,10 +40,13 @@ def spinning() -> dict[str, float]:
     return rubbed("spinning")
 
 
-def fine() -> dict[str, float]:
-    """Collision of tilted blocks of 8 cells, off the middle."""
-    found = collision.collide(collision.build(8, 8, 1.0, "tilted shifted"))
-    return {OVERLAP: found[OVERLAP]}
+def twelve() -> dict[str, float]:
+    """Blocks that collide at twelve random tilts, without friction."""
+    found = []
+    for k in range(tilts.QUICK):
+        setting = tilts.collide(k)
+        found.append(collision.collide(setting.scene)[OVERLAP])
+    return {MEDIAN: float(np.median(found))}
 
 
 def balls() -> dict[str, float]:

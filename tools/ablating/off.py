@@ -82,9 +82,11 @@ def straight(model, x0, work, first, begin=impulse.begin) -> None:
 
 
 def level(model, x0, work, first, begin=impulse.begin) -> None:
-    """In the place of ``impulse.begin``: no facet leans."""
+    """In the place of ``impulse.begin``: no facet leans, and no couple comes of it."""
     begin(model, x0, work, first)
     work.contacts.ramp.zero_()
+    if model.friction == 0.0:
+        wp.copy(work.contacts.coupled, work.contacts.weight)
 
 
 def all_planes(model, x, v, work, deep, close=surface.close) -> None:

@@ -92,8 +92,8 @@ def balls(count: int) -> Setting:
 def deep(part: float, aside: float = 0.0) -> Setting:
     """Two cubes start in each other.
 
-    With the overlap closed and the far faces where they are, each is shorter by half of it. Hooke's
-    law for the columns that meet, cut free from the rest, bounds that energy from below.
+    Closed at once, before anything moves, the overlap would leave each cube shorter by half of it.
+    Hooke's law for the columns that meet, cut free from the rest, bounds that energy from below.
     """
     scene = wc.Scene(NONE, friction=0.0)
     for k in range(2):

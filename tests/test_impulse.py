@@ -130,19 +130,21 @@ def test_friction_stays_in_the_cone_and_normal_impulses_push(
 def test_without_friction_impulses_are_between_the_normals_and_those_of_the_facets(
     rng, stages, find_contacts, records, jittered
 ):
-    scene = meeting(rng, jittered, 0.0)
-    _, x0, _, _, c = exchanged(scene, stages, find_contacts, records, edges=False)
-    s, left = rubbed(c)
-    assert (s > 0.0).any()
-    # Rounding.
-    np.testing.assert_allclose(left, 0.0, atol=1e-6 * c.lam.max())
-    used = np.linalg.norm(c.ramp, axis=1) > 0.0
-    a, b, d = np.moveaxis(x0[c.vert[used, 2:]], 1, 0)
-    facet = np.cross(b - a, d - a)
-    facet /= np.linalg.norm(facet, axis=1)[:, None]
-    whole = c.normal[used] + c.ramp[used]
-    whole /= np.linalg.norm(whole, axis=1)[:, None]
-    np.testing.assert_allclose(whole, facet, atol=1e-5)  # float32
+    climbs = 0
+    for _ in range(6):  # in 3 draws of 40 nothing climbs
+        scene = meeting(rng, jittered, 0.0)
+        _, x0, _, _, c = exchanged(scene, stages, find_contacts, records, edges=False)
+        s, left = rubbed(c)
+        climbs += (s > 0.0).sum()
+        np.testing.assert_allclose(left, 0.0, atol=1e-6 * c.lam.max())  # rounding
+        used = np.linalg.norm(c.ramp, axis=1) > 0.0
+        a, b, d = np.moveaxis(x0[c.vert[used, 2:]], 1, 0)
+        facet = np.cross(b - a, d - a)
+        facet /= np.linalg.norm(facet, axis=1)[:, None]
+        whole = c.normal[used] + c.ramp[used]
+        whole /= np.linalg.norm(whole, axis=1)[:, None]
+        np.testing.assert_allclose(whole, facet, atol=1e-5)  # float32
+    assert climbs > 0
 
 
 def test_no_contact_approaches_further_than_its_gap(rng, stages, find_contacts, records, jittered):

@@ -69,15 +69,15 @@ PARTS = {
     "looks": Part(
         "look after the closure",
         without(solver, "move_surfaces", off.blind),
-        impacts.twelve,
-        impacts.MEDIAN,
+        impacts.fine,
+        impacts.OVERLAP,
         FINEST,
     ),
     "vertices": Part(
         "of it, the look at vertices",
         without(solver, "move_surfaces", off.unseen),
-        impacts.twelve,
-        impacts.MEDIAN,
+        impacts.fine,
+        impacts.OVERLAP,
         FINEST,
     ),
     "couple": Part(
@@ -90,8 +90,8 @@ PARTS = {
     "strays": Part(
         "vertices that left or crossed their triangles",
         without(surface, "leftover", off.no_strays),
-        impacts.twelve,
-        impacts.MEDIAN,
+        impacts.fine,
+        impacts.OVERLAP,
         FINEST,
     ),
     "wide": Part(

@@ -37,7 +37,7 @@ its normal n_f, at x0, so that the tangential impulse may point down the ramp as
     p_t = s t + r,   0 <= s <= lambda,  |r| <= mu lambda       nearest to p_t - u_t / W_c
 
 which stops the climb and, as it acts against the motion, adds no energy. At s = lambda the whole
-pushes along n_f. There is no ramp where friction is left out, nor where a rim is too sharp for one.
+pushes along n_f. There is no ramp across a gap that is too wide for friction, nor at a sharp rim.
 
 Sweep j runs from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
 method, except at a contact where that change was a step too far. The last sweep is a plain one.

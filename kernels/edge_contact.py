@@ -5,7 +5,9 @@ triangle t1 and leaves by t2.
 
     ridge     t1 and t2 share an edge ab: n = +-(pq x ab), on the side of n1 + n2; the contact joins
               the closest points of pq and ab, kept when both lie inside their segments
-    face      otherwise: the middle of the inner piece of pq against its closest surface point
+    face      otherwise: the inner piece of pq against the closest surface point to its middle,
+              where the piece is deepest: at the mean of its ends, weighted by their depths
+              below that face
 
 The ridge is also left when it is more than twice as far from pq as the middle is from the surface:
 an edge that lies flush in a face would else be pushed out sideways through the other faces. In a
@@ -22,7 +24,7 @@ Whatever it is, a contact must push against a face of its edge (opposing.py).
 
 import warp as wp
 
-from warp_contact.kernels.geometry import NONE, lines_closest
+from warp_contact.kernels.geometry import NONE, lines_closest, projected_weights
 from warp_contact.kernels.opposing import edge_looks, opposes
 from warp_contact.kernels.surface_query import (
     Crossing,
@@ -36,7 +38,7 @@ from warp_contact.kernels.surface_query import (
     starts_inside,
     with_tri,
 )
-from warp_contact.kernels.vertex_contact import STALE
+from warp_contact.kernels.vertex_contact import SLIP, STALE
 
 wp.set_module_options({"enable_backward": False})
 
@@ -118,18 +120,37 @@ def on_ridge(
 
 
 @wp.func
-def on_face(middle: wp.vec3, t: float, hit: Hit, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3]):
-    """The contact of the middle of a piece, at t on its edge, with its closest surface point."""
+def on_face(
+    p: wp.vec3,
+    q: wp.vec3,
+    first: float,
+    last: float,
+    hit: Hit,
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+) -> EdgeContact:
+    """The contact of a piece of pq, from first to last, with the point closest to its middle."""
     out = EdgeContact()
     out.vert = tris[hit.tri]
     out.n = face_normal(out.vert, x)
-    gap = hit_point(hit, tris, x) - middle
+    point = hit_point(hit, tris, x)
+    out.t = 0.5 * (first + last)
+    gap = point - p - out.t * (q - p)
     if wp.dot(gap, out.n) > 0.0:
         out.n = wp.normalize(gap)
     out.d = hit.t
-    out.t = t
     out.w = hit.w
     out.found = True
+    a = wp.max(wp.dot(point - p - first * (q - p), out.n), 0.0)
+    b = wp.max(wp.dot(point - p - last * (q - p), out.n), 0.0)
+    if a + b > 0.0:
+        t = (a * first + b * last) / (a + b)
+        own = p + t * (q - p)
+        w = projected_weights(own, out.n, x[out.vert[0]], x[out.vert[1]], x[out.vert[2]])
+        if wp.length(w - hit.w) < SLIP:
+            out.t = t
+            out.d = wp.dot(point - own, out.n)
+            out.w = w
     return out
 
 
@@ -222,12 +243,12 @@ def crossing_contact(
         if contact.found and wp.min(SHARP * contact.half, 1.0) * contact.d <= 2.0 * hit.t:
             if not fresh or start_gap(contact, i, j, x0) > -STALE * edge:
                 return contact
-            face = on_face(middle, t, hit, tris, x)
+            face = on_face(p, q, enter.t, leave.t, hit, tris, x)
             if start_gap(face, i, j, x0) > start_gap(contact, i, j, x0):
                 return face
             return contact
         if hit.tri >= 0 and hit.t > FLAT * edge:
-            return on_face(middle, t, hit, tris, x)
+            return on_face(p, q, enter.t, leave.t, hit, tris, x)
     elif enter.tri >= 0:
         hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, q)
         if hit.tri >= 0:

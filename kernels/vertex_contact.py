@@ -4,7 +4,8 @@ The contact point is where the ray from the vertex along its direction leaves th
 Teschner 2005, section 3.2), and the way to there replaces the depth. Where no direction is known,
 or the ray would leave much deeper than the depth tells, the closest point of the surface serves
 instead. So it does where the contact would have overlapped at the start of the step already, and
-the closest point's less: the vertex came in by another side.
+the closest point's less: the vertex came in by another side. Where that would have overlapped too,
+close to a rim, it is led back through the triangle by which it came in.
 
 A vertex in the skin, outside, makes a contact with a gap. The impulses then know of it before it
 closes: what rests stays in contact in every step, and its force does not come in blows.
@@ -38,6 +39,7 @@ NEAR = wp.constant(0.05)  # of an edge: a vertex this close to a wall may lie in
 FLUSH = wp.constant(1.0e-5)  # of an edge: a vertex this deep lies in the surface
 BESIDE = wp.constant(0.1)  # weights: where a ray from inside the body leaves far from that outside
 FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
+ASTRAY = wp.constant(2.0)  # nor a way back this many times longer than that of the step
 
 
 @wp.struct
@@ -123,6 +125,33 @@ def closest_contact(
     return contact_at(near, i, n, tris, x0)
 
 
+@wp.func
+def entry_contact(
+    surface: wp.uint64,
+    body: int,
+    tris: wp.array[wp.vec3i],
+    x0: wp.array[wp.vec3],
+    x: wp.array[wp.vec3],
+    i: int,
+    edge: float,  # [m]
+) -> VertexContact:
+    """The contact of vertex i with the triangle by which it came in since the step began.
+
+    The way back is that relative to the closest point of the surface, which may turn.
+    """
+    out = VertexContact()
+    near = closest_hit(surface, body, tris, x, x[i], 0.1 * edge)
+    if near.tri < 0:
+        return out
+    back = x0[i] - hit_point(near, tris, x0) - (x[i] - hit_point(near, tris, x))
+    if wp.length_sq(back) == 0.0:
+        return out
+    ray = leaving_hit(surface, body, tris, x, x[i], wp.normalize(back))
+    if ray.tri >= 0 and ray.t <= ASTRAY * wp.length(back):
+        out = contact_at(ray, i, face_normal(tris[ray.tri], x), tris, x0)
+    return out
+
+
 @wp.kernel
 def vertex_contacts(
     # in
@@ -181,6 +210,10 @@ def vertex_contacts(
             near = closest_contact(surface, body, tris, vs_start, vs_tri, x0, x, i, body_edge[body])
             if near.found and not (out.found and out.start >= near.start):
                 out = near
+        if out.found and fresh and out.start < -STALE * body_edge[body]:
+            entry = entry_contact(surface, body, tris, x0, x, i, body_edge[body])
+            if entry.found and entry.start > out.start:
+                out = entry
         if not out.found:
             continue
         t = tris[out.hit.tri]

@@ -154,14 +154,14 @@ def stages():
     return _stages
 
 
-def _find_contacts(model, work, x0, x=None, edges=False) -> SimpleNamespace:
+def _find_contacts(model, work, x0, x=None, edges=False, fresh=False) -> SimpleNamespace:
     from warp_contact import candidates, solver
 
     x = x0 if x is None else x
     candidates.refresh(model, x0, x, work)
-    solver.vertex_contacts(model, x0, x, work, fresh=False)
+    solver.vertex_contacts(model, x0, x, work, fresh)
     if edges:
-        solver.edge_contacts(model, x0, x, work, fresh=False)
+        solver.edge_contacts(model, x0, x, work, fresh)
     assert not work.contacts.needed.numpy().any()
     return _records(work)
 
@@ -175,7 +175,7 @@ def _records(work) -> SimpleNamespace:
 
 @pytest.fixture
 def find_contacts():
-    """Run stages 1 and 2: ``find_contacts(model, work, x0, x, edges=False)``; the records."""
+    """Records after stages 1 and 2, ``find_contacts(model, work, x0, x, edges, fresh)``."""
     return _find_contacts
 
 

@@ -86,6 +86,30 @@ def test_edges_that_pass_each_other_make_no_contact(rng, stages, find_contacts, 
     assert find_contacts(model, work, state.x, edges=True).n == 0
 
 
+def test_a_piece_under_a_face_is_led_out_as_a_whole(rng, stages, find_contacts, turned):
+    """In by the top, out by a side, through triangles that share a corner but no edge."""
+    scene, rotate = Scene(), rotation_matrix(turn := turned())
+    cube = box(1.0, 1)
+    x = cube.vertices
+    top = next(t for t in cube.surface if (x[t, 2] > 0.4).all() and (x[t, 0] > 0.4).sum() == 1)
+    weights = np.where(x[top, 0] > 0.4, 0.9, 0.05)
+    enter = weights @ x[top]
+    leave = np.array([0.5, enter[1], 0.5 - 2.0 * DEPTH])
+    along = 4.0 * (leave - enter)
+    away = [(0.9, enter[1] + side, 1.2) for side in (-0.3, 0.3)]
+    scene.add_body(cube, RUBBER, rotation=turn)
+    tet = TetMesh([enter - along, leave + along, *away], [[0, 1, 2, 3]])
+    scene.add_body(tet, RUBBER, rotation=turn)
+    model, state, work = stages(scene)
+    c = find_contacts(model, work, state.x, edges=True)
+    (k,) = (k for k in range(c.n) if set(c.vert[k, :2]) == {8, 9})
+    np.testing.assert_allclose(c.normal[k], rotate[:, 2], atol=1e-5)  # float32
+    # The middle is half as deep: led out by that much, the piece would still be half inside.
+    assert c.depth[k] == pytest.approx(2.0 * DEPTH, abs=1e-6)
+    own = c.coef[k, :2] @ state.x.numpy()[c.vert[k, :2]]
+    np.testing.assert_allclose(own, rotate @ leave, atol=1e-6)
+
+
 @pytest.mark.parametrize("friction", [0.0, 1.0])
 def test_sharp_wedges_hold_each_other_and_gain_no_energy(friction):
     """Ridges of 19 degrees: the middle of the inner piece is closer to the sides than to them."""

@@ -4,8 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import warp as wp
 
-from warp_contact import NeoHookean, Scene, box, sphere
+from warp_contact import NeoHookean, Scene, TetMesh, box, sphere
 from warp_contact.scene import rotation_matrix
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -115,6 +116,23 @@ def test_a_contact_point_lies_along_the_direction_at_the_depth(stages, find_cont
     gap = -np.einsum("ck,cki->ci", c.coef, state.x.numpy()[c.vert])
     # Weights are good to 1e-6 on edges of 0.2.
     np.testing.assert_allclose(gap[used], (c.depth[:, None] * c.normal)[used], atol=2e-6)
+
+
+def test_a_vertex_goes_back_by_the_side_it_came_in_by(rng, stages, find_contacts, turned):
+    """Down through the top, close to a side by which all its edges leave."""
+    scene, rotate = Scene(), rotation_matrix(turn := turned())
+    scene.add_body(box(1.0, 2), RUBBER, rotation=turn)
+    tip = TetMesh([[0, 0, 0], [1.0, -0.3, 0.2], [1.0, 0.3, 0.2], [1.0, 0, 0.5]], [[0, 1, 2, 3]])
+    before, depth = 0.002, 0.05
+    place = np.array([0.49, rng.uniform(0.1, 0.2), 0.5 + before])
+    scene.add_body(tip, RUBBER, rotate @ place, turn)
+    model, state, work = stages(scene)
+    x = state.x.numpy().copy()
+    x[-4:] -= (before + depth) * rotate[:, 2].astype(np.float32)
+    c = find_contacts(model, work, state.x, wp.array(x, dtype=wp.vec3), fresh=True)
+    (k,) = np.flatnonzero(c.vert[:, 0] == len(x) - 4)
+    np.testing.assert_allclose(c.normal[k], rotate[:, 2], atol=1e-5)  # float32
+    assert c.depth[k] == pytest.approx(depth, abs=1e-6)
 
 
 class Reference:

@@ -11,7 +11,7 @@ when the step began is left to the search, which knows better than the masses wh
 step without one it is looked at again first.
 
 A move p n of a pair that slides by u_t changes the angular momentum by p n x u_t. It is handed back
-to the velocities as the couple of impulse.py, dv_k = (b_k . p u_t) n / m_k.
+to the velocities as the couple of tangent.py, dv_k = (b_k . p u_t) n / m_k.
 
 slack is what exceeds the largest move of a step, less the resting gap of the impulses: a body that
 starts deep inside another would be inverted by a full correction. Contacts without an overlap are

@@ -14,9 +14,9 @@ import warp as wp
 from warp_contact.kernels.candidates import LEAST
 from warp_contact.kernels.edge_contact import EdgeContact
 from warp_contact.kernels.geometry import lines_closest, projected_weights
-from warp_contact.kernels.impulse import turned
 from warp_contact.kernels.opposing import edge_looks, opposes
 from warp_contact.kernels.surface_query import face_normal
+from warp_contact.kernels.tangent import turned
 
 wp.set_module_options({"enable_backward": False})
 

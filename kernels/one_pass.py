@@ -1,14 +1,14 @@
 """What forces of one pass share: each contact is given a normal impulse, friction follows from it.
 
-    p_t = -min(mu lambda, |u_t| / W_c) u_t^       friction, W_c of impulse.py [N s]
+    p_t = -min(mu lambda, |u_t| / W_c) u_t^       friction, W_c of tangent.py [N s]
 
-The vertices receive the couple of friction across a gap as in impulse.py; u is the plain relative
+The vertices receive the couple of friction across a gap as in tangent.py; u is the plain relative
 velocity, without the turning.
 """
 
 import warp as wp
 
-from warp_contact.kernels.impulse import clamped
+from warp_contact.kernels.tangent import clamped
 
 wp.set_module_options({"enable_backward": False})
 

@@ -7,7 +7,7 @@ of edges see held.py.
 
 import warp as wp
 
-from warp_contact.kernels.impulse import turned
+from warp_contact.kernels.tangent import turned
 
 wp.set_module_options({"enable_backward": False})
 

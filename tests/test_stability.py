@@ -18,6 +18,7 @@ from stable import (
     outcome,
     paper,
     primitives,
+    ratios,
     speed,
     sweeps,
     tilts,
@@ -225,6 +226,16 @@ def test_the_methods_are_what_they_are_called():
 def test_the_frontier_runs_between_fine_and_other_cells():
     sides = chart.frontier([["fine", "lost"], ["fine", "fine"]])
     assert sides == [((0.5, 0.5), (-0.5, 0.5)), ((0.5, 1.5), (0.5, 0.5))]
+
+
+@pytest.mark.parametrize("moduli", [4.0, 16.0])
+def test_a_block_is_crushed_by_its_own_weight_with_and_without_a_contact(moduli):
+    """The frontier of the mass ratios is that of the material."""
+    alone = attempt(partial(ratios.own_weight, moduli))
+    on_another = attempt(partial(sweeps.SWEEPS["ratio"].build, moduli, 1e-4))
+    want = outcome.FINE if moduli < 10.0 else outcome.INVERTED
+    print(alone.volume, on_another.volume)
+    assert classify(alone) == classify(on_another) == want
 
 
 @pytest.mark.parametrize("sweep", sweeps.SWEEPS)

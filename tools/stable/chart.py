@@ -13,7 +13,7 @@ import numpy as np
 from stable.outcome import FINE, OUTCOMES, Record, classify
 from stable.paper import FIGURES, marks
 from stable.setup import METHODS, attempt
-from stable.sweeps import MOST_STEPS, SWEEPS
+from stable.sweeps import MOST_STEPS, SWEEPS, Sweep
 
 COLUMNS = (
     *("sweep", "method", "x_name", "x", "y_name", "y", "outcome", "overlap", "energy_gained"),
@@ -98,6 +98,8 @@ def picture(plots, name: str, quick: bool, found: dict, path: Path) -> None:
         axis.imshow(codes, origin="lower", cmap=colours, vmin=-0.5, vmax=len(OUTCOMES) - 0.5)
         for ends in frontier(grid):
             axis.plot(*ends, color="black", linewidth=2.0)
+        if s.limit:
+            axis.plot(*limit(s, xs, ys), color="black", linestyle=":", linewidth=1.5)
         for (i, j), (text, colour) in labels(scenes, xs, ys).items():
             box = {"boxstyle": "round,pad=0.15", "facecolor": colour, "linewidth": 0.8}
             axis.text(i, j, text, fontsize=8, ha="center", va="center", bbox=box)
@@ -111,10 +113,19 @@ def picture(plots, name: str, quick: bool, found: dict, path: Path) -> None:
     for outcome, colour in zip(OUTCOMES, COLOURS, strict=True):
         legend.scatter([], [], s=120, marker="s", color=colour, edgecolor="grey", label=outcome)
     legend.plot([], [], color="black", linewidth=2.0, label="frontier of what is fine")
+    if s.limit:
+        legend.plot([], [], color="black", linestyle=":", label=s.limit[0])
     legend.legend(loc="upper center", fontsize=11, ncols=2)
     legend.text(0.02, 0.02, KEY, transform=legend.transAxes, fontsize=10, va="bottom")
     figure.savefig(path, dpi=100)
     plots.close(figure)
+
+
+def limit(s: Sweep, xs: np.ndarray, ys: np.ndarray) -> tuple[list[float], list[float]]:
+    """The line of the sweep's limit, as far as it lies on the map."""
+    places = [(float(i), place(y, ys)) for i, y in enumerate(s.limit[1](xs).tolist())]
+    on = [(i, j) for i, (j, off) in places if not off]
+    return [i for i, _ in on], [j for _, j in on]
 
 
 def labels(scenes: list[tuple], xs: np.ndarray, ys: np.ndarray) -> dict:

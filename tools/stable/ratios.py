@@ -33,6 +33,20 @@ def cases(quick: bool) -> Iterator[Case]:
         yield Case(
             f"B3 stiffness {ratio:g}:1, soft on stiff", partial(column, 1.0, 1.0 / ratio, 0.3)
         )
+    yield Case("B3 block of a weight of 4 moduli, nothing else", partial(own_weight, 4.0))
+
+
+def own_weight(moduli: float) -> Setting:
+    """A block, held at its base, whose weight over its section is so many times its modulus.
+
+    What the material carries without any contact: about 14 moduli before its tets turn inside out
+    (kernels/neo_hookean.py), less where it falls on itself.
+    """
+    scene = wc.Scene(DOWN)
+    block = wc.box(0.1, 3)
+    young = 1000.0 * 9.81 * 0.1 / moduli
+    scene.add_body(block, soft(young), fixed=block.vertices[:, 2] < -0.049)
+    return Setting(scene, 0.1, 600.0, pairs=())
 
 
 def heavy(seconds: float) -> Setting:

@@ -24,6 +24,7 @@ class Sweep:
         x_name, y_name: what the axes are, with their units
         x, y: first and last value of both, spaced by equal factors
         build: the setting of a cell
+        limit: what no contact changes: its name, and y at each x
     """
 
     title: str
@@ -32,6 +33,7 @@ class Sweep:
     x: tuple[float, float]
     y: tuple[float, float]
     build: Callable[[float, float], Setting]
+    limit: tuple[str, Callable[[np.ndarray], np.ndarray]] | None = None
 
     def axes(self, quick: bool) -> tuple[np.ndarray, np.ndarray]:
         """The values of both."""
@@ -51,7 +53,8 @@ def step_stiffness(step: float, young: float) -> Setting:
 def mass_stiffness(mass: float, young: float) -> Setting:
     """A block falls on one that is held; mass and stiffness of the upper over that of the lower.
 
-    At the largest mass ratio the pressure at rest is as large as the lower block's modulus.
+    At the largest mass ratio the pressure at rest is as large as the lower block's modulus. The
+    weight of the upper block over its section is mass / (1e4 young) of its own moduli.
     """
     scene = wc.Scene(DOWN, friction=0.3)
     base = 1e4 * 1000.0 * 9.81 * EDGE
@@ -101,6 +104,7 @@ SWEEPS = {
     "ratio": Sweep(
         "a block falls on another, step left to the solver",
         *("mass ratio", "stiffness ratio", (1.0, 1e4), (1e-4, 1e4), mass_stiffness),
+        limit=("the upper block's weight is 10 of its moduli", lambda mass: mass / 1e5),
     ),
     "depth": Sweep(
         "a block starts in a plate",

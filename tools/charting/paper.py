@@ -58,17 +58,21 @@ def astray(panel: Panel, motion: Motion) -> float:
     """Root mean square distance from the converged motion, in mean edges of the scene."""
     parts.sound(panel, motion)
     gap(panel, motion)
-    d = motion.x - converged(panel)
+    return aside(panel, motion.x, converged(panel))
+
+
+def aside(panel: Panel, one: np.ndarray, other: np.ndarray) -> float:
+    """Root mean square distance of two motions, in mean edges of the scene."""
     unit = np.mean([edge(body.mesh) for body in panel.scene().bodies])
-    return float(np.sqrt((d**2).sum(axis=2).mean()) / unit)
+    return float(np.sqrt(((one - other) ** 2).sum(axis=2).mean()) / unit)
 
 
 @cache
-def converged(panel: Panel) -> np.ndarray:
-    """Positions of the default at ``CONVERGED`` times the steps [m], shape (frames + 1, n, 3)."""
+def converged(panel: Panel, times: int = CONVERGED) -> np.ndarray:
+    """Positions of the default at so many times the steps [m], shape (frames + 1, n, 3)."""
     setting = Own("default", "balanced")
     steps = ours.run(panel, setting, None, np.inf).steps
-    return ours.run(panel, setting, CONVERGED * steps, np.inf).x
+    return ours.run(panel, setting, times * steps, np.inf).x
 
 
 def apart(panel: Panel, motion: Motion) -> float:

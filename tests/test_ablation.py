@@ -9,6 +9,7 @@ import pytest
 import warp as wp
 
 from warp_contact import candidates, depth, impulse, solver, substeps, surface
+from warp_contact.kernels import edge_contact, vertex_contact
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
@@ -16,7 +17,7 @@ import ablation
 from ablating.off import without
 from ablating.parts import PARTS, Part
 
-OWNERS = candidates, depth, impulse, solver, substeps, surface
+OWNERS = candidates, depth, impulse, solver, substeps, surface, edge_contact, vertex_contact
 
 
 @pytest.fixture
@@ -85,6 +86,17 @@ def test_every_part_changes_something_and_is_back_afterwards():
             assert changed or wp.launch is not launch, part.name
         assert [dict(vars(owner)) for owner in OWNERS] == before
         assert wp.launch is launch
+
+
+def test_a_constant_of_a_kernel_is_another_one_and_then_the_same_again():
+    part = PARTS["entry"]
+    before = part.case()[part.figure]
+    with part.off():
+        without_it = part.case()[part.figure]
+    print(before, without_it)
+    # The corner is left out of one step and hangs on the wrong side: 1 % of an edge was seen.
+    assert before < 0.1 < without_it
+    assert part.case()[part.figure] == before
 
 
 def test_tilted_blocks_need_contacts_of_edges():

@@ -8,9 +8,9 @@ known to, and counts where the figure is less. A part earns its place where its 
 1.5. The exit status is 1 when one does not: it is to be removed. Times are the best of some runs.
 
 The parts are switched off from outside, in ``ablating/off.py``; none is an option of the package.
-What cannot be reached like that, because it is inside a kernel, is not in the table. Nor is what
-cannot be left out: stage 1, the impulses of stage 5, and stage 3, which only says where stage 4 has
-to look.
+What cannot be reached like that, because it is inside a kernel and no constant of it turns it off,
+is not in the table. Nor is what cannot be left out: stage 1, the impulses of stage 5, and stage 3,
+which only says where stage 4 has to look.
 """
 
 import argparse

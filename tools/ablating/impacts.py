@@ -45,6 +45,19 @@ def fine() -> dict[str, float]:
     return {OVERLAP: found[OVERLAP]}
 
 
+def beside() -> dict[str, float]:
+    """Tilted blocks of 8 cells, one aside."""
+    found = collision.collide(collision.build(8, 8, 1.0, "tilted shifted"))
+    return {OVERLAP: found[OVERLAP]}
+
+
+def rim() -> dict[str, float]:
+    """Corner that comes in close to a rim."""
+    turned, shift = (161.0, 219.0, 204.0), np.array([0.015, 0.019, 0.0])
+    scene = collision.build(3, 3, 1.0, "tilted shifted", angles=turned, shift=shift)
+    return {OVERLAP: collision.collide(scene)[OVERLAP]}
+
+
 def balls() -> dict[str, float]:
     """Balls of 147 vertices, one falls on the other."""
     return gained(partial(limits.balls, 147))

@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable
+from contextlib import contextmanager
+from types import ModuleType
 from unittest import mock
 
 import warp as wp
@@ -14,6 +16,25 @@ def without(owner, attribute: str, new) -> Callable:
     """A context maker that puts ``new`` in the place of a function or constant of the package."""
     getattr(owner, attribute)
     return lambda: mock.patch.object(owner, attribute, new)
+
+
+def constant(owner: ModuleType, name: str, value, *users: ModuleType) -> Callable:
+    """A context maker that compiles the kernels of ``users`` with another constant of ``owner``."""
+    getattr(owner, name)
+
+    @contextmanager
+    def compiled():
+        modules = [wp.get_module(module.__name__) for module in {owner, *users}]
+        try:
+            with mock.patch.object(owner, name, wp.constant(value)):
+                for module in modules:
+                    module.mark_modified()
+                yield
+        finally:
+            for module in modules:
+                module.mark_modified()
+
+    return compiled
 
 
 def without_repeats():

@@ -9,6 +9,7 @@ import warp as wp
 from ablating import apart, impacts, loads, off
 from ablating.off import without
 from warp_contact import candidates, depth, impulse, solver, substeps, surface
+from warp_contact.kernels import crossing, edge_contact, vertex_contact
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,20 @@ PARTS = {
         "vertices that left or crossed their triangles",
         without(surface, "leftover", off.no_strays),
         impacts.fine,
+        impacts.OVERLAP,
+        FINEST,
+    ),
+    "entry": Part(
+        "back by the side it came in by",
+        off.constant(vertex_contact, "ASTRAY", 0.0),
+        impacts.rim,
+        impacts.OVERLAP,
+        FINEST,
+    ),
+    "deep end": Part(
+        "edges led out by their deep end",
+        off.constant(edge_contact, "SLIP", -1.0, crossing),
+        impacts.beside,
         impacts.OVERLAP,
         FINEST,
     ),

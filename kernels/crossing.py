@@ -134,8 +134,8 @@ def at_start(c: EdgeContact, i: int, j: int, x: wp.array[wp.vec3]) -> EdgeContac
             c.t = start[0]
             c.w = wp.vec3(1.0 - start[1], start[1], 0.0)
     else:
-        middle = x[i] + c.t * (x[j] - x[i])
-        w = projected_weights(middle, c.n, x[t[0]], x[t[1]], x[t[2]])
+        own = x[i] + c.t * (x[j] - x[i])
+        w = projected_weights(own, c.n, x[t[0]], x[t[1]], x[t[2]])
         if wp.length(w - c.w) < SLIP:
             c.w = w
     return c

@@ -5,9 +5,9 @@ triangle t1 and leaves by t2.
 
     ridge     t1 and t2 share an edge ab: n = +-(pq x ab), on the side of n1 + n2; the contact joins
               the closest points of pq and ab, kept when both lie inside their segments
-    face      otherwise: the inner piece of pq against the closest surface point to its middle,
-              where the piece is deepest: at the mean of its ends, weighted by their depths
-              below that face
+    face      otherwise: n leads from the middle of the inner piece of pq to the closest surface
+              point, and the contact lies at the mean of the ends of the piece, weighted by their
+              depths along n: at the deep one where the other is in the face
 
 The ridge is also left when it is more than twice as far from pq as the middle is from the surface:
 an edge that lies flush in a face would else be pushed out sideways through the other faces. In a
@@ -38,7 +38,7 @@ from warp_contact.kernels.surface_query import (
     starts_inside,
     with_tri,
 )
-from warp_contact.kernels.vertex_contact import SLIP, STALE
+from warp_contact.kernels.vertex_contact import STALE
 
 wp.set_module_options({"enable_backward": False})
 
@@ -46,6 +46,7 @@ wp.set_module_options({"enable_backward": False})
 SURE = wp.constant(0.125)
 SHARP = wp.constant(1.64)  # a ridge with a dihedral angle below 75 degrees is sharp
 TURNED = wp.constant(0.95)  # cosine: of two edges that are almost parallel, n turns in a step
+ASIDE = wp.constant(1.0)  # weights: so far from the closest point may the contact with a face lie
 FLAT = wp.constant(2.0e-4)  # of an edge: an edge this deep lies in the face, whatever its direction
 
 
@@ -147,7 +148,7 @@ def on_face(
         t = (a * first + b * last) / (a + b)
         own = p + t * (q - p)
         w = projected_weights(own, out.n, x[out.vert[0]], x[out.vert[1]], x[out.vert[2]])
-        if wp.length(w - hit.w) < SLIP:
+        if wp.length(w - hit.w) < ASIDE:
             out.t = t
             out.d = wp.dot(point - own, out.n)
             out.w = w

@@ -30,10 +30,8 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-TURN = wp.constant(0.1)  # gap times gradient above which a surface cannot take the couple
 UPRIGHT = wp.constant(0.85)  # n . n_f below which a facet is another side of a rim, not a ramp
 LEVEL = wp.constant(1.0e-3)  # slope below which it is none, but rounding
-STEEP = wp.constant(8.0)  # gradient times edge of a triangle too thin or too tilted for it
 
 
 @wp.func

@@ -137,11 +137,11 @@ def entry_contact(
 ) -> VertexContact:
     """The contact of vertex i with the triangle by which it came in since the step began.
 
-    The way back is that relative to the closest point of the surface, which may turn.
+    The way is measured against the closest point of the surface, as the body may move too.
     """
     out = VertexContact()
     near = closest_hit(surface, body, tris, x, x[i], 0.1 * edge)
-    if near.tri < 0:
+    if inner_side(near, tris, x, x[i]) <= 0.0:
         return out
     back = x0[i] - hit_point(near, tris, x0) - (x[i] - hit_point(near, tris, x))
     if wp.length_sq(back) == 0.0:
@@ -212,7 +212,7 @@ def vertex_contacts(
                 out = near
         if out.found and fresh and out.start < -STALE * body_edge[body]:
             entry = entry_contact(surface, body, tris, x0, x, i, body_edge[body])
-            if entry.found and entry.start > out.start:
+            if entry.found and entry.start >= -STALE * body_edge[body]:
                 out = entry
         if not out.found:
             continue

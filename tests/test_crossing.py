@@ -86,28 +86,37 @@ def test_edges_that_pass_each_other_make_no_contact(rng, stages, find_contacts, 
     assert find_contacts(model, work, state.x, edges=True).n == 0
 
 
-def test_a_piece_under_a_face_is_led_out_as_a_whole(rng, stages, find_contacts, turned):
-    """In by the top, out by a side, through triangles that share a corner but no edge."""
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_a_piece_under_a_face_is_led_out_by_its_deep_end(stages, find_contacts, turned, share):
+    """In by one side of a block, out by another, below its top: as deep there, or less, or not."""
     scene, rotate = Scene(), rotation_matrix(turn := turned())
     cube = box(1.0, 1)
     x = cube.vertices
+    # Close to the end of a rim at which the top has a triangle that has no other part in it: the
+    # sides are not next to each other, and there is no ridge to lead the edge out by.
     top = next(t for t in cube.surface if (x[t, 2] > 0.4).all() and (x[t, 0] > 0.4).sum() == 1)
-    weights = np.where(x[top, 0] > 0.4, 0.9, 0.05)
+    weights = np.where(x[top, 0] > 0.4, 0.8, np.where(x[top, 1] > 0.4, 0.13, 0.07))
     enter = weights @ x[top]
     leave = np.array([0.5, enter[1], 0.5 - 2.0 * DEPTH])
-    along = 4.0 * (leave - enter)
-    away = [(0.9, enter[1] + side, 1.2) for side in (-0.3, 0.3)]
+    if share > 0.0:
+        enter = np.array([-0.5, enter[1], 0.5 - 2.0 * DEPTH * share])
+    along = (leave - enter) * (1.0 if share else 4.0)
+    away = [(0.9, enter[1] + side, 2.0) for side in (-0.3, 0.3)]
     scene.add_body(cube, RUBBER, rotation=turn)
     tet = TetMesh([enter - along, leave + along, *away], [[0, 1, 2, 3]])
     scene.add_body(tet, RUBBER, rotation=turn)
     model, state, work = stages(scene)
     c = find_contacts(model, work, state.x, edges=True)
     (k,) = (k for k in range(c.n) if set(c.vert[k, :2]) == {8, 9})
-    np.testing.assert_allclose(c.normal[k], rotate[:, 2], atol=1e-5)  # float32
-    # The middle is half as deep: led out by that much, the piece would still be half inside.
-    assert c.depth[k] == pytest.approx(2.0 * DEPTH, abs=1e-6)
+    # The surface is known to 1e-7, and the depth is a 50th of a side.
+    np.testing.assert_allclose(c.normal[k], rotate[:, 2], atol=3e-5)
+    # The middle is less deep: led out by that much, a part of the piece would still be inside.
+    part = share / (1.0 + share)
+    depth = 2.0 * DEPTH * (1.0 + share**2) / (1.0 + share)
+    assert c.depth[k] == pytest.approx(depth, abs=3e-6)
     own = c.coef[k, :2] @ state.x.numpy()[c.vert[k, :2]]
-    np.testing.assert_allclose(own, rotate @ leave, atol=1e-6)
+    # The same of the shallower end, a hundredth of a side deep, moves it by 1e-5 and more.
+    np.testing.assert_allclose(own, rotate @ (part * enter + (1.0 - part) * leave), atol=1e-4)
 
 
 @pytest.mark.parametrize("friction", [0.0, 1.0])

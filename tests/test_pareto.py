@@ -229,8 +229,9 @@ def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
 def test_the_converged_motion_hardly_changes_with_half_the_steps(name):
     from charting import paper
 
-    panel = paper.scene(name, True)
-    change = paper.aside(panel, paper.converged(panel), paper.converged(panel, 8))
+    panel = paper.scene(name, True).also[1]
+    half = paper.converged(panel, paper.CONVERGED // 2)
+    change = paper.rms_distance(panel, paper.converged(panel), half)
     print(change)
     # 1.1e-4 and 0.7e-4 were seen; the figures that it is to judge begin at 1.6e-3.
     assert 0.0 < change < 5e-4

@@ -228,14 +228,21 @@ def test_the_frontier_runs_between_fine_and_other_cells():
     assert sides == [((0.5, 0.5), (-0.5, 0.5)), ((0.5, 1.5), (0.5, 0.5))]
 
 
-@pytest.mark.parametrize("moduli", [4.0, 16.0])
-def test_a_block_is_crushed_by_its_own_weight_with_and_without_a_contact(moduli):
-    """The frontier of the mass ratios is that of the material."""
+@pytest.mark.parametrize(("moduli", "want"), [(4.0, outcome.FINE), (16.0, outcome.INVERTED)])
+def test_a_block_carries_4_of_its_moduli_and_not_16_with_a_contact_and_without(moduli, want):
+    """What limits the map of ratios at its lower rim is the material."""
     alone = attempt(partial(ratios.own_weight, moduli))
     on_another = attempt(partial(sweeps.SWEEPS["ratio"].build, moduli, 1e-4))
-    want = outcome.FINE if moduli < 10.0 else outcome.INVERTED
     print(alone.volume, on_another.volume)
     assert classify(alone) == classify(on_another) == want
+
+
+def test_the_line_of_a_limit_ends_at_the_rim_of_the_map():
+    s = sweeps.SWEEPS["ratio"]
+    i, j = chart.limit_line(s, *s.axes(False))
+    # Mass ratios 10^0, 10^0.4, ... against stiffness ratios 10^-4, 10^-3.2, ...: from 10^0.8 on.
+    assert i == [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0]
+    np.testing.assert_allclose(j, np.linspace(-0.25, 3.75, 9))
 
 
 @pytest.mark.parametrize("sweep", sweeps.SWEEPS)

@@ -53,6 +53,7 @@ def beside() -> dict[str, float]:
 
 def rim() -> dict[str, float]:
     """Corner that comes in close to a rim."""
+    # Of two hundred random draws of 3:3 and 2:5 cells, one of six that need what this is to show.
     turned, shift = (161.0, 219.0, 204.0), np.array([0.015, 0.019, 0.0])
     scene = collision.build(3, 3, 1.0, "tilted shifted", angles=turned, shift=shift)
     return {OVERLAP: collision.collide(scene)[OVERLAP]}

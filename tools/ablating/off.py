@@ -19,7 +19,10 @@ def without(owner, attribute: str, new) -> Callable:
 
 
 def constant(owner: ModuleType, name: str, value, *users: ModuleType) -> Callable:
-    """A context maker that compiles the kernels of ``users`` with another constant of ``owner``."""
+    """A context maker that compiles kernels with another constant of ``owner``.
+
+    Those of ``owner``, and of ``users``: modules whose kernels call functions of it.
+    """
     getattr(owner, name)
 
     @contextmanager

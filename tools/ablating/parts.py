@@ -104,7 +104,7 @@ PARTS = {
     ),
     "deep end": Part(
         "edges led out by their deep end",
-        off.constant(edge_contact, "SLIP", -1.0, crossing),
+        off.constant(edge_contact, "ASIDE", 0.0, crossing),
         impacts.beside,
         impacts.OVERLAP,
         FINEST,

@@ -4,10 +4,10 @@ Surfaces that press on each other ought to be at distance zero, so an overlap is
 is one too: a method that keeps bodies apart by a margin has no overlap, and a gap that can be seen.
 
 The motion has no closed form. It is compared with that of the default at ``CONVERGED`` times the
-steps, which half as many change by 2e-4 of an edge. The reference is our own, so for our methods
-the figure tells how consistent they are. Others confirm it: the stiffest penalty and the predicted
-forces come within 0.5 to 1.2 % of an edge of it. An engine with another law of elasticity moves
-otherwise by the difference of the laws, which no part of this figure takes out.
+steps, which half as many change by 1e-4 to 2e-4 of an edge. The reference is our own, so for our
+methods the figure tells how consistent they are. Others confirm it: the stiffest penalty and the
+predicted forces come within 0.5 to 1.2 % of an edge of it. An engine with another law of elasticity
+moves otherwise by the difference of the laws, which no part of this figure takes out.
 """
 
 from dataclasses import replace
@@ -58,10 +58,10 @@ def astray(panel: Panel, motion: Motion) -> float:
     """Root mean square distance from the converged motion, in mean edges of the scene."""
     parts.sound(panel, motion)
     gap(panel, motion)
-    return aside(panel, motion.x, converged(panel))
+    return rms_distance(panel, motion.x, converged(panel))
 
 
-def aside(panel: Panel, one: np.ndarray, other: np.ndarray) -> float:
+def rms_distance(panel: Panel, one: np.ndarray, other: np.ndarray) -> float:
     """Root mean square distance of two motions, in mean edges of the scene."""
     unit = np.mean([edge(body.mesh) for body in panel.scene().bodies])
     return float(np.sqrt(((one - other) ** 2).sum(axis=2).mean()) / unit)

@@ -99,7 +99,7 @@ def picture(plots, name: str, quick: bool, found: dict, path: Path) -> None:
         for ends in frontier(grid):
             axis.plot(*ends, color="black", linewidth=2.0)
         if s.limit:
-            axis.plot(*limit(s, xs, ys), color="black", linestyle=":", linewidth=1.5)
+            axis.plot(*limit_line(s, xs, ys), color="black", linestyle=":", linewidth=1.5)
         for (i, j), (text, colour) in labels(scenes, xs, ys).items():
             box = {"boxstyle": "round,pad=0.15", "facecolor": colour, "linewidth": 0.8}
             axis.text(i, j, text, fontsize=8, ha="center", va="center", bbox=box)
@@ -121,7 +121,7 @@ def picture(plots, name: str, quick: bool, found: dict, path: Path) -> None:
     plots.close(figure)
 
 
-def limit(s: Sweep, xs: np.ndarray, ys: np.ndarray) -> tuple[list[float], list[float]]:
+def limit_line(s: Sweep, xs: np.ndarray, ys: np.ndarray) -> tuple[list[float], list[float]]:
     """The line of the sweep's limit, as far as it lies on the map."""
     places = [(float(i), place(y, ys)) for i, y in enumerate(s.limit[1](xs).tolist())]
     on = [(i, j) for i, (j, off) in places if not off]

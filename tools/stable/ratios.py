@@ -1,4 +1,4 @@
-"""B3: bodies of very unequal mass or stiffness on each other."""
+"""B3: bodies of very unequal mass or stiffness on each other, or that hardly carry themselves."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -39,8 +39,8 @@ def cases(quick: bool) -> Iterator[Case]:
 def own_weight(moduli: float) -> Setting:
     """A block, held at its base, whose weight over its section is so many times its modulus.
 
-    What the material carries without any contact: about 14 moduli before its tets turn inside out
-    (kernels/neo_hookean.py), less where it falls on itself.
+    There is no contact: what goes inside out here does so by its material, which carries about 15
+    moduli at rest (kernels/neo_hookean.py), and less of what comes on at once.
     """
     scene = wc.Scene(DOWN)
     block = wc.box(0.1, 3)

@@ -24,7 +24,7 @@ class Sweep:
         x_name, y_name: what the axes are, with their units
         x, y: first and last value of both, spaced by equal factors
         build: the setting of a cell
-        limit: what no contact changes: its name, and y at each x
+        limit: where something else than contact decides: its name, and y at each x
     """
 
     title: str
@@ -104,6 +104,7 @@ SWEEPS = {
     "ratio": Sweep(
         "a block falls on another, step left to the solver",
         *("mass ratio", "stiffness ratio", (1.0, 1e4), (1e-4, 1e4), mass_stiffness),
+        # Between the cells where it goes inside out, also if held at its base, and those where not.
         limit=("the upper block's weight is 10 of its moduli", lambda mass: mass / 1e5),
     ),
     "depth": Sweep(

@@ -13,7 +13,7 @@ from checks import collision
 from stable.case import Case
 from stable.watch import Setting
 
-DRAWS, QUICK = 60, 12
+DRAWS, QUICK = 180, 12
 CELLS = (3, 3), (2, 5), (4, 6), (8, 8)
 ASIDE = 0.03  # the largest shift along x and y [m]
 

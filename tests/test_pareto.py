@@ -120,6 +120,10 @@ def test_words_and_picture_keep_every_failure(tmp_path):
     assert "failed: broken, 1 of 1: not finite" in text
     assert "failed: absent, 1 of 1: not installed" in text
     assert "behind the front: slow" in text
+    assert "of the default's front" not in text  # there is no default
+    named = [replace(p, method="default") if p.method == "slow" else p for p in points()]
+    text = words.report("head", {"A": "title"}, named)
+    assert "than a point of the default's front: exact, between, equal\n" in text
     pyplot = pytest.importorskip("matplotlib.pyplot")
     from charting import plot
 

@@ -1,9 +1,10 @@
 """The chart in words, computed from its table."""
 
+from charting.front import dominates, front
 from charting.front import fastest_below as fastest
-from charting.front import front
 from charting.result import Point
 
+DEFAULT = "default"
 LEVELS = 0.05, 0.01, 0.001  # errors at which times are compared
 TIMES = 1.0, 10.0  # wall seconds per simulated second at which errors are compared
 
@@ -19,7 +20,7 @@ def report(head: str, titles: dict[str, str], points: list[Point]) -> str:
 
 
 def panel(points: list[Point]) -> list[str]:
-    """Who is on the front, who is behind whom, times at equal error, failures."""
+    """Who is on the front, behind it, before the default; times at equal error; failures."""
     methods = list(dict.fromkeys(p.method for p in points))
     ahead = front(points)
     lines = [f"  front: {_show(p)}" for p in ahead] or ["  front: empty, every run failed"]
@@ -30,6 +31,11 @@ def panel(points: list[Point]) -> list[str]:
         if fine and method not in on:
             best = min(fine, key=lambda p: p.error)
             lines.append(f"  behind the front: {_show(best)} is its best")
+    own = front(_of(points, DEFAULT))
+    before = [m for m in methods if any(dominates(p, q) for p in _of(points, m) for q in own)]
+    if own:
+        said = ", ".join(before) or "none"
+        lines.append(f"  faster and no less accurate than a point of the default's front: {said}")
     for level in LEVELS:
         first = sorted(filter(None, (fastest(_of(points, m), level) for m in methods)), key=_wall)
         said = ", ".join(f"{p.method} {p.wall:.3g} s" for p in first) or "none"

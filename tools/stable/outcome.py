@@ -47,6 +47,7 @@ class Record:
         steps: taken
         time: of the run [s]
         asked: time that it should have lasted [s]
+        note: a further figure, in words
     """
 
     refused: str = ""
@@ -63,6 +64,7 @@ class Record:
     steps: int = 0
     time: float = 0.0
     asked: float = 0.0
+    note: str = ""
 
     @property
     def reason(self) -> str:
@@ -70,7 +72,7 @@ class Record:
         passed = ""
         if self.through:
             passed = "{} points, of {} through {}".format(self.tunnelled, *self.through)
-        return self.refused or self.error or self.lost or passed
+        return self.refused or self.error or self.lost or passed or self.note
 
 
 def classify(r: Record) -> str:

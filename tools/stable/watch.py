@@ -75,7 +75,7 @@ class Watch:
         start = sim.measure()
         self._start, self.record.touched = start.energy, start.overlap > 0.0
         self._scale = self.scale()
-        self._flight, self._elastic = 0.0, setting.held
+        self._flight, self._elastic = 0.0, 0.0
 
     def scale(self) -> float:
         """What the energy is measured against [J]."""
@@ -118,7 +118,13 @@ class Watch:
         self._flight = max(self._flight, self.flight())
         self._elastic = max(self._elastic, now.elastic)
         if self.setting.recovers:
-            r.gained = max(0.0, (self._flight - self._elastic) / (self._elastic + self._scale))
+            held = max(self._elastic, self.setting.held)
+            r.gained = max(0.0, (self._flight - held) / (held + self._scale))
+            if self.setting.held > 0.0:
+                freed = self._flight / self.setting.held
+                seen = self._flight / self._elastic if self._elastic > 0.0 else np.inf
+                r.note = f"motion {freed:.2f} of what the overlap holds closed, {seen:.2f} of"
+                r.note += " the elastic energy seen"
         elif self.setting.drive is None:
             r.gained = max(r.gained, (now.energy - self._start) / self._scale)
         return r

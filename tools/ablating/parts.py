@@ -112,7 +112,7 @@ PARTS = {
     "wide": Part(
         "no friction across wide gaps",
         without(impulse, "begin", off.rubbing),
-        impacts.spinning,
+        impacts.rough_rim,
         impacts.SPIN,
         ROUNDED,
     ),

@@ -194,11 +194,14 @@ def go_on(
     way: wp.array[float],  # (n_body + n_plane,) [m]
     # out
     n_place: wp.array[int],  # (1,) 0: a look at the edges begins to count
+    n_new: wp.array[int],  # (1,) 0
 ):
     """One thread per body."""
     m = wp.tid()
-    if m == 0 and not hold:
-        n_place[0] = 0
+    if m == 0:
+        n_new[0] = 0
+        if not hold:
+            n_place[0] = 0
     way[m] = way[m] + motion[m]
     pace[m] = wp.max(motion[m], FADING * pace[m])
     motion[m] = 0.0

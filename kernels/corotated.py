@@ -110,7 +110,7 @@ def set_forces(
     volume: wp.array[float],  # (n_tet,) [m^3]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
-    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
 ):
     """One thread per tet of the model: set its corner forces, minus the energy gradient."""
     r = wp.tid()
@@ -132,7 +132,7 @@ def apply_stiffness(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     dx: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
-    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
 ):
     """One thread per tet of the model: set its corner entries of K(x) dx."""
     r = wp.tid()
@@ -154,7 +154,7 @@ def apply_damping(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
-    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
 ):
     """One thread per tet of the model: set its corner entries of C(x) v."""
     r = wp.tid()

@@ -74,6 +74,7 @@ def find_crossings(
     crossing: wp.array[int],  # (capacity + 1,) contacts of the edge with the body
     # out, added to
     n_place: wp.array[int],  # (1,)
+    n_new: wp.array[int],  # (1,) contacts found
 ):
     """For each candidate, and for the room behind them.
 
@@ -111,6 +112,7 @@ def find_crossings(
         if not found.found or (last >= 0 and is_among(found, place[c], contact)):
             continue
         crossing[c] = crossing[c] + 1
+        wp.atomic_add(n_new, 0, 1)
         k = wp.atomic_add(n_place, 0, 1)
         if k >= contact.shape[0]:
             continue

@@ -208,7 +208,8 @@ def closest_of(
         best = closer(best, tri[k], tris, x, p)
     if best.t <= sure:
         return best
-    return closest_hit(surface, body, tris, x, p, reach)
+    root = wp.bvh_get_group_root(surface, body)
+    return closest_hit(surface, root, tris, x, p, reach)
 
 
 @wp.func

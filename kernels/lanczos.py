@@ -45,7 +45,7 @@ def multiply(
     chunk: wp.array[int],  # (n_chunk + 1,) first vertex of each chunk
     vt_start: wp.array[int],  # (n_vert + 1,)
     vt_corner: wp.array[int],  # (4 n_tet,)
-    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4), K q_j
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,), K q_j
     mass: wp.array[float],  # (n_vert,) [kg]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
     j: int,

@@ -70,7 +70,8 @@ def vertex_overlaps(
             body != vert_body[i]
             and wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0
         ):
-            hit = closest_hit(surface, body, tris, x, p, 0.1 * body_edge[body])
+            root = wp.bvh_get_group_root(surface, body)
+            hit = closest_hit(surface, root, tris, x, p, 0.1 * body_edge[body])
             if hit.t > overlap[k]:
                 overlap[k] = hit.t
                 partner[k] = body
@@ -103,10 +104,11 @@ def edge_overlaps(
     body = next_in(bodies, world, wp.min(p, q), wp.max(p, q), -1)
     while body >= 0:
         if body != own:
-            piece = first_crossing(surface, body, tris, x, p, q - p)
+            root = wp.bvh_get_group_root(surface, body)
+            piece = first_crossing(surface, root, tris, x, p, q - p)
             if piece.enter.tri >= 0 and piece.leave.tri >= 0:
                 middle = p + 0.5 * (piece.enter.t + piece.leave.t) * (q - p)
-                hit = closest_hit(surface, body, tris, x, middle, 0.1 * body_edge[body])
+                hit = closest_hit(surface, root, tris, x, middle, 0.1 * body_edge[body])
                 if hit.t > overlap[e] and inner_side(hit, tris, x, middle) > 0.0:
                     overlap[e] = hit.t
                     partner[e] = body

@@ -7,13 +7,14 @@
 ``vt_corner`` lists the corners at a vertex as 4 tet + corner. They are added in the order of
 that list and never by atomics, so runs repeat bit for bit.
 
-Damping M dv/dt = -C v over h, in s stages of RKL1 over 2 h and half way back:
+Damping M dv/dt = -C v over h, in s stages of RKL1 over h / a, that count by the share a:
 
-    Y_0 = v,  Y_j = (2j-1)/j Y_{j-1} - (j-1)/j Y_{j-2} - (2j-1)/j 4h/(s^2+s) M^-1 C Y_{j-1}
-    v' = (v + Y_s) / 2 = p v,  p = (1 + P_s(1 - 4 z/(s^2+s))) / 2,  z = h L, L of M^-1 C
+    Y_0 = v,  Y_j = (2j-1)/j Y_{j-1} - (j-1)/j Y_{j-2} - (2j-1)/j 2h/(a (s^2+s)) M^-1 C Y_{j-1}
+    v' = (1 - a) v + a Y_s = p v,  p = 1 - a + a P_s(1 - 2 z/(a (s^2+s))),  z = h L, L of M^-1 C
 
-with P_s Legendre. p = 1 - z + O(z^2), and 0 < p <= 1 for 2 z < s^2 + s. Damping comes first, so
-that rest does not depend on it, and Euler is v' = p v - h w^2 x, x' = x + h v': stable for
+with P_s Legendre. p = 1 - z + O(z^2), and |p| <= 1 for z < a (s^2+s). For a = 1/2 no mode turns
+round, 0 < p; a larger share reaches further with as many stages. Damping comes first, so that rest
+does not depend on it, and Euler is v' = p v - h w^2 x, x' = x + h v': stable for
 (h w)^2 < 2 (1 + p).
 
 Source of RKL1: Meyer, Balsara, Aslam 2014, "A stabilized Runge-Kutta-Legendre method for
@@ -27,12 +28,11 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def corner_sum(
-    i: int, vt_start: wp.array[int], vt_corner: wp.array[int], f_tet: wp.array2d[wp.vec3]
+    i: int, vt_start: wp.array[int], vt_corner: wp.array[int], f_tet: wp.array[wp.vec3]
 ) -> wp.vec3:
     f = wp.vec3(0.0, 0.0, 0.0)
     for k in range(vt_start[i], vt_start[i + 1]):
-        c = vt_corner[k]
-        f += f_tet[c >> 2, c & 3]
+        f += f_tet[vt_corner[k]]
     return f
 
 
@@ -41,7 +41,7 @@ def gather(
     # in
     vt_start: wp.array[int],  # (n_vert + 1,)
     vt_corner: wp.array[int],  # (4 n_tet,)
-    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
     # out
     f: wp.array[wp.vec3],  # (n_vert,) [N]
 ):
@@ -55,7 +55,7 @@ def predict(
     # in
     vt_start: wp.array[int],  # (n_vert + 1,)
     vt_corner: wp.array[int],  # (4 n_tet,)
-    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
     gravity: wp.vec3,  # [m/s^2]
     dt: wp.array[float],  # (1,) [s]
@@ -94,26 +94,27 @@ def relax(
     # in
     vt_start: wp.array[int],  # (n_vert + 1,)
     vt_corner: wp.array[int],  # (4 n_tet,)
-    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N], C Y_{j-1}
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N], C Y_{j-1}
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
     dt: wp.array[float],  # (1,) [s]
     j: int,
     s: int,
+    share: wp.array[float],  # (1,) a
     v: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_0
     last: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_{j-1}
     before: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_{j-2}
     # out
-    y: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_j, half way back for j = s; may be any of these
+    y: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_j, v' for j = s; may be any of these
 ):
     """One thread per vertex: stage j of s of the damping."""
     i = wp.tid()
     u = last[i]
     if inv_mass[i] > 0.0:
         back = float(1 - j) / float(j)
-        kick = 4.0 * dt[0] * float(2 * j - 1) / float(j * s * (s + 1)) * inv_mass[i]
+        kick = 2.0 * dt[0] / share[0] * float(2 * j - 1) / float(j * s * (s + 1)) * inv_mass[i]
         u += back * (before[i] - u) - kick * corner_sum(i, vt_start, vt_corner, f_tet)
         if j == s:
-            u = 0.5 * (u + v[i])
+            u = share[0] * u + (1.0 - share[0]) * v[i]
     y[i] = u
 
 

@@ -41,6 +41,24 @@ def looks(
 
 
 @wp.func
+def looks_against(
+    i: int,
+    n: wp.vec3,
+    tris: wp.array[wp.vec3i],
+    vs_start: wp.array[int],
+    vs_tri: wp.array[int],
+    x: wp.array[wp.vec3],
+) -> bool:
+    """Whether a face of normal n opposes one of vertex i; any does inside its body."""
+    for e in range(vs_start[i], vs_start[i + 1]):
+        t = tris[vs_tri[e]]
+        a = area_vector(x[t[0]], x[t[1]], x[t[2]])
+        if wp.dot(a, n) / wp.length(a) < -LEAN:
+            return True
+    return vs_start[i + 1] == vs_start[i]
+
+
+@wp.func
 def edge_looks(s: wp.vec3i, t: wp.vec3i, n: wp.vec3, x: wp.array[wp.vec3]) -> wp.vec2:
     """Least and largest n . n_own over the two triangles of an edge."""
     a = wp.dot(wp.normalize(area_vector(x[s[0]], x[s[1]], x[s[2]])), n)
@@ -61,7 +79,7 @@ def along(look: wp.vec2) -> bool:
 @wp.func
 def closest_opposing(
     surface: wp.uint64,
-    body: int,
+    root: int,
     tris: wp.array[wp.vec3i],
     vs_start: wp.array[int],
     vs_tri: wp.array[int],
@@ -75,12 +93,11 @@ def closest_opposing(
     best.t = reach
     k = int(0)
     grow = wp.vec3(reach, reach, reach)
-    root = wp.bvh_get_group_root(surface, body)
     query = wp.bvh_query_aabb(surface, x[i] - grow, x[i] + grow, root)
     while wp.bvh_query_next(query, k):
         found = closer(best, k, tris, x, x[i])
         if found.tri != best.tri:
             n = face_normal(tris[k], x)
-            if opposes(looks(i, n, tris, vs_start, vs_tri, x)):
+            if looks_against(i, n, tris, vs_start, vs_tri, x):
                 best = found
     return best

@@ -20,8 +20,8 @@ are those through a side that the vertex does not look against (opposing.py).
 import warp as wp
 
 from warp_contact.kernels.hits import hit_range, is_hit
-from warp_contact.kernels.opposing import looks, opposes
-from warp_contact.kernels.surface_query import first_hit, hit_normal, hit_point
+from warp_contact.kernels.opposing import looks_against
+from warp_contact.kernels.surface_query import corner_normals, first_hit, hit_point
 
 wp.set_module_options({"enable_backward": False})
 
@@ -57,20 +57,26 @@ def border_depth(
         body = hit_body[e]
         if body >= n_body:
             continue
+        root = wp.bvh_get_group_root(surface, body)
         p = x[i]
         weight = float(0.0)
         depth = float(0.0)
         r = wp.vec3(0.0, 0.0, 0.0)
+        normals = wp.mat33()  # of the triangle crossed last: most edges cross the same one
+        crossed = int(-1)
         for k in range(vn_start[i], vn_start[i + 1]):
             j = vn_vert[k]
             if not is_hit(j, body, pair_start, hit_at, hit_body):
                 u = p - x[j]
-                hit = first_hit(surface, body, tris, x, x[j], u, -1.0e-6, -1.0, GRAZING)
+                hit = first_hit(surface, root, tris, x, x[j], u, -1.0e-6, -1.0, GRAZING)
                 if hit.tri >= 0:
-                    n = hit_normal(hit, tris, vs_start, vs_tri, x)
+                    if hit.tri != crossed:
+                        crossed = hit.tri
+                        normals = corner_normals(tris[crossed], tris, vs_start, vs_tri, x)
+                    n = wp.normalize(normals * hit.w)
                     gap = hit_point(hit, tris, x) - p
                     d = wp.dot(gap, n)
-                    if d > 0.0 and opposes(looks(i, n, tris, vs_start, vs_tri, x)):
+                    if d > 0.0 and looks_against(i, n, tris, vs_start, vs_tri, x):
                         w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-12 * wp.length_sq(u))
                         weight += w
                         depth += w * d

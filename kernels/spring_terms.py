@@ -168,6 +168,6 @@ def energy_sum(p: mat43, r: int, param: wp.array2d[float], volume: float) -> flo
 
 
 @wp.func
-def store(q: int, f: mat43, f_tet: wp.array2d[wp.vec3]):
+def store(q: int, f: mat43, f_tet: wp.array[wp.vec3]):
     for a in range(4):
-        f_tet[q, a] = f[a]
+        f_tet[4 * q + a] = f[a]

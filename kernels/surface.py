@@ -82,7 +82,7 @@ def tractions(
     # in
     vt_start: wp.array[int],  # (n_vert + 1,)
     vt_corner: wp.array[int],  # (4 n_tet,)
-    f_tet: wp.array2d[wp.vec3],  # (n_tet, 4) [N]
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
     s: wp.array[wp.vec3],  # (n_vert,) [m]
     area: wp.array[float],  # (n_vert,) [m^2]
     # out

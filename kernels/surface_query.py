@@ -4,7 +4,7 @@
     first_crossing both, from one query
     leaving_hit    where a ray from inside leaves the body
     closest_hit    the closest point of the surface
-    hit_normal     the outward normal at a hit: of the face, blended over smooth edges only
+    corner_normals outward normals of a triangle: of the face, blended over smooth edges only
 
 A hit is (triangle, distance along the query, weights of b and c); triangle -1 means none.
 Normals blended over the rim of a box push sideways and inject energy, so a neighbouring triangle
@@ -45,7 +45,7 @@ def weights3(h: wp.vec3) -> wp.vec3:
 @wp.func
 def first_hit(
     surface: wp.uint64,
-    body: int,
+    root: int,
     tris: wp.array[wp.vec3i],
     x: wp.array[wp.vec3],
     p: wp.vec3,
@@ -60,13 +60,16 @@ def first_hit(
     best.t = NONE
     k = int(0)
     q = p + u
-    root = wp.bvh_get_group_root(surface, body)
     query = wp.bvh_query_aabb(surface, wp.min(p, q), wp.max(p, q), root)
     while wp.bvh_query_next(query, k):
         a = x[tris[k][0]]
         b = x[tris[k][1]]
         c = x[tris[k][2]]
-        if side * wp.dot(u, wp.cross(b - a, c - a)) > 0.0:
+        n = wp.cross(b - a, c - a)
+        slope = wp.dot(u, n)
+        height = wp.dot(p - a, n)
+        # On the side asked for, and with the end not before the plane.
+        if side * slope > 0.0 and side * (height + slope) >= 0.0:
             h = segment_hit(p, u, a, b, c, grazing)
             if h[0] > after and h[0] <= 1.0:
                 if h[0] < best.t or (h[0] == best.t and k < best.tri):
@@ -124,7 +127,7 @@ def starts_inside(found: Crossing) -> bool:
 @wp.func
 def first_crossing(
     surface: wp.uint64,
-    body: int,
+    root: int,
     tris: wp.array[wp.vec3i],
     x: wp.array[wp.vec3],
     p: wp.vec3,
@@ -134,19 +137,18 @@ def first_crossing(
     out = no_crossing()
     k = int(0)
     q = p + u
-    root = wp.bvh_get_group_root(surface, body)
     query = wp.bvh_query_aabb(surface, wp.min(p, q), wp.max(p, q), root)
     while wp.bvh_query_next(query, k):
         out = with_tri(out, k, tris, x, p, u)
     if starts_inside(out):
-        out.leave = first_hit(surface, body, tris, x, p, u, out.enter.t, 1.0, PARALLEL)
+        out.leave = first_hit(surface, root, tris, x, p, u, out.enter.t, 1.0, PARALLEL)
     return out
 
 
 @wp.func
 def leaving_hit(
     surface: wp.uint64,
-    body: int,
+    root: int,
     tris: wp.array[wp.vec3i],
     x: wp.array[wp.vec3],
     p: wp.vec3,
@@ -157,7 +159,7 @@ def leaving_hit(
     best.tri = -1
     best.t = NONE
     k = int(0)
-    query = wp.bvh_query_ray(surface, p, r, wp.bvh_get_group_root(surface, body))
+    query = wp.bvh_query_ray(surface, p, r, root)
     while wp.bvh_query_next(query, k, best.t):
         a = x[tris[k][0]]
         b = x[tris[k][1]]
@@ -191,7 +193,7 @@ def closer(best: Hit, t: int, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3], p:
 @wp.func
 def closest_hit(
     surface: wp.uint64,
-    body: int,
+    root: int,
     tris: wp.array[wp.vec3i],
     x: wp.array[wp.vec3],
     p: wp.vec3,
@@ -202,7 +204,6 @@ def closest_hit(
     best.tri = -1
     best.t = NONE
     k = int(0)
-    root = wp.bvh_get_group_root(surface, body)
     radius = float(reach)
     for _attempt in range(20):
         grow = wp.vec3(radius, radius, radius)
@@ -236,20 +237,23 @@ def corner_normal(
 
 
 @wp.func
-def hit_normal(
-    hit: Hit,
+def corner_normals(
+    t: wp.vec3i,
     tris: wp.array[wp.vec3i],
     vs_start: wp.array[int],
     vs_tri: wp.array[int],
     x: wp.array[wp.vec3],
-) -> wp.vec3:
-    """Outward unit normal at a hit."""
-    t = tris[hit.tri]
+) -> wp.mat33:
+    """Outward unit normals at the corners of a triangle, as columns.
+
+    That at a hit is the sum of them by its weights, normalised.
+    """
     face = area_vector(x[t[0]], x[t[1]], x[t[2]])
-    n = hit.w[0] * corner_normal(t[0], face, tris, vs_start, vs_tri, x)
-    n += hit.w[1] * corner_normal(t[1], face, tris, vs_start, vs_tri, x)
-    n += hit.w[2] * corner_normal(t[2], face, tris, vs_start, vs_tri, x)
-    return wp.normalize(n)
+    return wp.matrix_from_cols(
+        corner_normal(t[0], face, tris, vs_start, vs_tri, x),
+        corner_normal(t[1], face, tris, vs_start, vs_tri, x),
+        corner_normal(t[2], face, tris, vs_start, vs_tri, x),
+    )
 
 
 @wp.func

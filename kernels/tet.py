@@ -95,13 +95,13 @@ def viscous_stress(f: wp.mat33, df: wp.mat33, mu: float, lam: float, beta: float
 
 
 @wp.func
-def store_stress(q: int, vp: wp.mat33, pose: wp.array[wp.mat33], f_tet: wp.array2d[wp.vec3]):
-    """Set row q of f_tet to vp Dm^-T, vp = -V P [J] for forces and +V P for their opposite."""
+def store_stress(q: int, vp: wp.mat33, pose: wp.array[wp.mat33], f_tet: wp.array[wp.vec3]):
+    """Set tet q in f_tet to vp Dm^-T, vp = -V P [J] for forces and +V P for their opposite."""
     h = vp * wp.transpose(pose[q])
     h1 = column(h, 0)
     h2 = column(h, 1)
     h3 = column(h, 2)
-    f_tet[q, 0] = -(h1 + h2 + h3)
-    f_tet[q, 1] = h1
-    f_tet[q, 2] = h2
-    f_tet[q, 3] = h3
+    f_tet[4 * q] = -(h1 + h2 + h3)
+    f_tet[4 * q + 1] = h1
+    f_tet[4 * q + 2] = h2
+    f_tet[4 * q + 3] = h3

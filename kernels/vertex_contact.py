@@ -66,7 +66,7 @@ def contact_at(
 @wp.func
 def inner_contact(
     surface: wp.uint64,
-    body: int,
+    root: int,
     tris: wp.array[wp.vec3i],
     x0: wp.array[wp.vec3],
     x: wp.array[wp.vec3],
@@ -80,11 +80,11 @@ def inner_contact(
     out = VertexContact()
     if layer < 0 or depth <= 0.0:
         return out
-    ray = leaving_hit(surface, body, tris, x, x[i], r)
+    ray = leaving_hit(surface, root, tris, x, x[i], r)
     if ray.tri < 0:  # in the skin, beside the body: from just inside it
-        near = closest_hit(surface, body, tris, x, x[i], 0.1 * edge)
+        near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
         inner = hit_point(near, tris, x) - 2.0 * SKIN * edge * face_normal(tris[near.tri], x)
-        ray = leaving_hit(surface, body, tris, x, inner, r)
+        ray = leaving_hit(surface, root, tris, x, inner, r)
         if ray.tri >= 0:
             ray.t = wp.dot(hit_point(ray, tris, x) - x[i], r)
             t = tris[ray.tri]
@@ -99,7 +99,7 @@ def inner_contact(
 @wp.func
 def closest_contact(
     surface: wp.uint64,
-    body: int,
+    root: int,
     tris: wp.array[wp.vec3i],
     vs_start: wp.array[int],
     vs_tri: wp.array[int],
@@ -110,10 +110,10 @@ def closest_contact(
 ) -> VertexContact:
     """The contact of vertex i with the closest point of the surface."""
     out = VertexContact()
-    near = closest_hit(surface, body, tris, x, x[i], 0.1 * edge)
+    near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
     inside = inner_side(near, tris, x, x[i])
     if inside <= FLUSH * edge:
-        near = closest_opposing(surface, body, tris, vs_start, vs_tri, x, i, 2.0 * SKIN * edge)
+        near = closest_opposing(surface, root, tris, vs_start, vs_tri, x, i, 2.0 * SKIN * edge)
     if near.tri < 0:
         return out
     n = face_normal(tris[near.tri], x)
@@ -128,7 +128,7 @@ def closest_contact(
 @wp.func
 def entry_contact(
     surface: wp.uint64,
-    body: int,
+    root: int,
     tris: wp.array[wp.vec3i],
     x0: wp.array[wp.vec3],
     x: wp.array[wp.vec3],
@@ -140,13 +140,13 @@ def entry_contact(
     The way is measured against the closest point of the surface, as the body may move too.
     """
     out = VertexContact()
-    near = closest_hit(surface, body, tris, x, x[i], 0.1 * edge)
+    near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
     if inner_side(near, tris, x, x[i]) <= 0.0:
         return out
     back = x0[i] - hit_point(near, tris, x0) - (x[i] - hit_point(near, tris, x))
     if wp.length_sq(back) == 0.0:
         return out
-    ray = leaving_hit(surface, body, tris, x, x[i], wp.normalize(back))
+    ray = leaving_hit(surface, root, tris, x, x[i], wp.normalize(back))
     if ray.tri >= 0 and ray.t <= ASTRAY * wp.length(back):
         out = contact_at(ray, i, face_normal(tris[ray.tri], x), tris, x0)
     return out
@@ -203,15 +203,16 @@ def vertex_contacts(
             continue
         if on_surface[i] == 0:
             continue
+        root = wp.bvh_get_group_root(surface, body)
         out = inner_contact(
-            surface, body, tris, x0, x, i, hit_layer[e], hit_depth[e], hit_dir[e], body_edge[body]
+            surface, root, tris, x0, x, i, hit_layer[e], hit_depth[e], hit_dir[e], body_edge[body]
         )
         if not out.found or (fresh and out.start < -STALE * body_edge[body]):
-            near = closest_contact(surface, body, tris, vs_start, vs_tri, x0, x, i, body_edge[body])
+            near = closest_contact(surface, root, tris, vs_start, vs_tri, x0, x, i, body_edge[body])
             if near.found and not (out.found and out.start >= near.start):
                 out = near
         if out.found and fresh and out.start < -STALE * body_edge[body]:
-            entry = entry_contact(surface, body, tris, x0, x, i, body_edge[body])
+            entry = entry_contact(surface, root, tris, x0, x, i, body_edge[body])
             if entry.found and entry.start >= -STALE * body_edge[body]:
                 out = entry
         if not out.found:

@@ -97,7 +97,7 @@ def build_model():
 
 
 def _at_vertices(launch, model, *fields) -> np.ndarray:
-    f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+    f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
     launch(model, *[wp.array(u, dtype=wp.vec3) for u in fields], f_tet)
     f = np.zeros((model.n_vert, 3))
     np.add.at(f, model.tets.numpy().ravel(), f_tet.numpy().reshape(-1, 3).astype(float))
@@ -162,6 +162,7 @@ def _find_contacts(model, work, x0, x=None, edges=False, fresh=False) -> SimpleN
     solver.vertex_contacts(model, x0, x, work, fresh)
     if edges:
         solver.edge_contacts(model, x0, x, work, fresh)
+    solver.arrange(model, x0, work)
     assert not work.contacts.needed.numpy().any()
     return _records(work)
 

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 from numpy.polynomial.legendre import Legendre
 
-from warp_contact import forces
+from warp_contact import forces, substeps
 from warp_contact.kernels import motion
 from warp_contact.materials import Corotated, NeoHookean, SpringNetwork
 
@@ -30,18 +30,24 @@ def deformed(x: np.ndarray, rng) -> np.ndarray:
     return x * [0.8, 1.3, 1.0] + 0.1 * rng.uniform(-1.0, 1.0, x.shape)
 
 
-def damp(model, x, v, dt: float, stages: int) -> np.ndarray:
+def damp(model, x, v, dt: float, stages: int, share: float = 0.5) -> np.ndarray:
     v = wp.array(v, dtype=wp.vec3)
-    f_tet = wp.full((model.n_tet, 4), wp.vec3(np.nan))  # scratch: whatever it holds
+    f_tet = wp.full(4 * model.n_tet, wp.vec3(np.nan))  # scratch: whatever it holds
     scratch = tuple(wp.full(model.n_vert, wp.vec3(np.nan)) for _ in range(2))
     x = wp.array(x, dtype=wp.vec3)
-    forces.damp(model, x, v, model.inv_mass, wp.full(1, dt, dtype=float), f_tet, scratch, stages)
+    dt, share = (wp.full(1, value, dtype=float) for value in (dt, share))
+    forces.damp(model, x, v, model.inv_mass, dt, f_tet, scratch, stages, share)
     return v.numpy().astype(float)
 
 
-def limit(stages: int) -> float:
+def limit(stages: int, share: float = 0.5) -> float:
     """Largest dt lambda_max for which ``forces.damp`` is stable."""
-    return (stages**2 + stages) / 2
+    return share * (stages**2 + stages)
+
+
+def factors(stages: int, share: float, part) -> np.ndarray:
+    """What is left of a mode at a part of the limit."""
+    return 1.0 - share + share * Legendre.basis(stages)(1.0 - 2.0 * part)
 
 
 def fastest(dense, model, x) -> tuple[float, np.ndarray]:
@@ -83,27 +89,42 @@ def test_damping_is_beta_times_the_stiffness_at_rest(material, body, build_model
 
 
 @materials
+@pytest.mark.parametrize("share", forces.SHARE)
 @pytest.mark.parametrize("stages", [1, 2, 3, 4, 7])
 def test_a_mode_shrinks_by_the_stability_polynomial(
-    material, stages, body, rng, build_model, dense
+    material, stages, share, body, rng, build_model, dense
 ):
     x = deformed(body[0], rng).astype(np.float32)
     model = build_model((*body, material))
     rate, mode = fastest(dense, model, x)
-    dt = 0.7 * limit(stages) / rate
-    factor = (1.0 + Legendre.basis(stages)(1.0 - 2.0 * 0.7)) / 2.0
+    dt = 0.7 * limit(stages, share) / rate
+    factor = factors(stages, share, 0.7)
     # Every stage rounds v a few times.
     atol = 100.0 * EPS * np.abs(mode).max()
-    np.testing.assert_allclose(damp(model, x, mode, dt, stages), factor * mode, atol=atol)
+    new = damp(model, x, mode, dt, stages, share)
+    np.testing.assert_allclose(new, factor * mode, atol=atol)
 
 
-def test_no_mode_is_turned_round():
+def test_with_the_least_share_no_mode_is_turned_round():
     z = np.linspace(0.0, 1.0, 10001)[:-1]
     for stages in range(1, 20):
-        factor = (1.0 + Legendre.basis(stages)(1.0 - 2.0 * z)) / 2.0
+        factor = factors(stages, 0.5, z)
         # P_s > -1 inside (-1, 1); only odd ones come near it, where z comes near its limit.
         assert factor.min() > 0.0
         assert factor.max() <= 1.0 + 1e-12  # rounding
+
+
+def test_steps_are_stable_whatever_share_is_needed():
+    """Of any mode within reach, with and without a damping in proportion to its stiffness."""
+    for z in np.geomspace(1e-3, 200.0, 400):
+        stages, share = forces.stages_for(z, 1.0), forces.share_for(z, 1.0)
+        reach = forces.reach(stages, share)
+        part = np.linspace(0.0, reach / limit(stages, share), 2001)
+        least = factors(stages, share, part).min()
+        assert least >= -1.0 / 6.0
+        h = forces.longest_step(stages, share)
+        assert h**2 <= 2.0 * (1.0 + least) * (1.0 + 1e-9)  # rounding
+        assert substeps.UNSTABLE * h > 2.0 * substeps.SAFETY
 
 
 @materials
@@ -149,8 +170,8 @@ def test_undamped_bodies_are_left_alone(body, rng, build_model):
 def test_without_damping_nothing_is_launched(body, build_model, monkeypatch):
     model = build_model((*body, NeoHookean(1e5, 0.3, 1000.0)))
     monkeypatch.setattr(wp, "launch", None)
-    x, v, dt, f_tet, w = (wp.zeros(1) for _ in range(5))
-    forces.damp(model, x, v, model.inv_mass, dt, f_tet, (w, w), 5)
+    x, v, dt, f_tet, w, share = (wp.zeros(1) for _ in range(6))
+    forces.damp(model, x, v, model.inv_mass, dt, f_tet, (w, w), 5, share)
 
 
 def test_damp_replays_from_a_graph(body, rng, build_model):
@@ -158,10 +179,10 @@ def test_damp_replays_from_a_graph(body, rng, build_model):
     start = rng.standard_normal(body[0].shape)
     expected = damp(model, body[0], start, 1e-4, 3)
     x, v = wp.array(body[0], dtype=wp.vec3), wp.array(start, dtype=wp.vec3)
-    f_tet, w = wp.zeros((model.n_tet, 4), dtype=wp.vec3), (wp.zeros_like(v), wp.zeros_like(v))
-    dt = wp.full(1, 1.0, dtype=float)
+    f_tet, w = wp.zeros(4 * model.n_tet, dtype=wp.vec3), (wp.zeros_like(v), wp.zeros_like(v))
+    dt, share = wp.full(1, 1.0, dtype=float), wp.full(1, 0.5, dtype=float)
     with wp.ScopedCapture() as capture:
-        forces.damp(model, x, v, model.inv_mass, dt, f_tet, w, 3)
+        forces.damp(model, x, v, model.inv_mass, dt, f_tet, w, 3, share)
     dt.fill_(1e-4)
     v.assign(start.astype(np.float32))
     wp.capture_launch(capture.graph)
@@ -171,8 +192,10 @@ def test_damp_replays_from_a_graph(body, rng, build_model):
 def test_enough_stages_are_taken():
     for z in (0.0, 1e-3, 1.0, 10.0, 1e3):
         s = forces.stages_for(z / 1e-3, 1e-3)
-        assert z * forces.MARGIN <= limit(s)
-        assert s == 0 or z * forces.MARGIN > limit(s - 1)
+        share = forces.share_for(z / 1e-3, 1e-3)
+        assert forces.SHARE[0] <= share <= forces.SHARE[1]
+        assert z * forces.MARGIN <= forces.reach(s, share) * (1.0 + 1e-12)  # rounding
+        assert s == 0 or z * forces.MARGIN > forces.reach(s - 1, forces.SHARE[1])
 
 
 @pytest.mark.parametrize("material", [NeoHookean, Corotated])
@@ -189,12 +212,12 @@ def test_first_mode_of_a_bar_decays_by_beta_omega_squared(material, ratio, box, 
 
     model = build_model((x, tets, material(1e6, 0.3, 1000.0, 2.0 * ratio / omega)), fixed=fixed)
     state = wp.array(x + 1e-3 * mode / np.abs(mode).max(), dtype=wp.vec3)
-    h = 0.8 * 2.0 / np.sqrt(value[-1])
+    h = substeps.SAFETY * 2.0 / np.sqrt(value[-1])
     rate = 2.0 * ratio / omega * value[-1]
-    assert h * rate > 5.0  # inside the forces it would have to be below 1 or so
+    assert h * rate > 4.0  # inside the forces it would have to be below 1 or so
     weight = model.mass.numpy()[:, None] * mode
     three_periods = int(3 * 2.0 * np.pi / omega / h)
-    q, p = modal_motion(model, state, x, weight, h, forces.stages_for(rate, h), three_periods)
+    q, p = modal_motion(model, state, x, weight, h, rate, three_periods)
     envelope = np.log(np.hypot(omega * q, p + ratio * omega * q))
     decay = -np.polyfit(h * np.arange(len(q)), envelope, 1)[0]
     # The decay per radian is the logarithmic decrement over 2 pi.  Off by h omega, about 1 %,
@@ -202,18 +225,19 @@ def test_first_mode_of_a_bar_decays_by_beta_omega_squared(material, ratio, box, 
     assert decay == pytest.approx(ratio * omega, rel=0.05)
 
 
-def modal_motion(model, x, rest, weight, h: float, stages: int, steps: int):
+def modal_motion(model, x, rest, weight, h: float, rate: float, steps: int):
     """Amplitude and velocity of a mode over ``steps`` steps of symplectic Euler and damping."""
     v, unused = wp.zeros_like(x), wp.zeros_like(x)
     w = (wp.zeros_like(x), wp.zeros_like(x))
-    f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+    f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
     mask = wp.full(model.n_tet, 1, dtype=int)
-    dt = wp.full(1, h, dtype=float)
+    stages, share = forces.stages_for(rate, h), forces.share_for(rate, h)
+    dt, share = (wp.full(1, value, dtype=float) for value in (h, share))
     gather = [model.vt_start, model.vt_corner, f_tet, model.inv_mass, wp.vec3(*model.gravity), dt]
     with wp.ScopedCapture() as capture:
         forces.internal_forces(model, x, mask, f_tet)
         wp.launch(motion.predict, dim=model.n_vert, inputs=[*gather, x, v], outputs=[unused, v])
-        forces.damp(model, x, v, model.inv_mass, dt, f_tet, w, stages)
+        forces.damp(model, x, v, model.inv_mass, dt, f_tet, w, stages, share)
         wp.launch(motion.advance, dim=model.n_vert, inputs=[dt, x, v], outputs=[x])
     q, p = np.empty(steps), np.empty(steps)
     for k in range(steps):

@@ -40,6 +40,7 @@ def go_on(sim: Simulation) -> dict[str, np.ndarray]:
     model, x, work = sim.model, sim.state.x, sim._work
     solver.vertex_contacts(model, x, x, work, True)
     solver.hold_edges(model, x, work, search=False)
+    solver.arrange(model, x, work)
     impulse.recall_edges(work)
     c, n = work.contacts, int(work.contacts.n.numpy()[0])
     return {k: getattr(c, k).numpy()[:n] for k in ("vert", "coef", "normal", "lam", "pair")}

@@ -48,20 +48,25 @@ def test_a_penalty_adds_the_highest_frequency_of_masses_that_it_joins_in_a_row()
     assert substeps.with_penalty(OMEGA, stiffness, 0.0) == OMEGA
 
 
-@pytest.mark.parametrize(("damped", "exact"), [(False, 2.0), (True, math.sqrt(2.0))])
-def test_a_step_is_refused_before_it_is_unstable(damped, exact):
-    # Euler needs (h omega)^2 < 2 (1 + p); p is 1 without damping and near 0 with much of it.
-    assert not substeps.stays_stable(0.9999 * exact / OMEGA, OMEGA, damped)
-    assert substeps.stays_stable(0.97 * exact / OMEGA, OMEGA, damped)
-    assert not substeps.stays_stable(1e-6, math.inf, damped)
-    assert not substeps.stays_stable(1e-6, math.nan, damped)
+# h times the rate of the damping, and the least p: 1 without it, 0 in one stage, in two stages 1/4
+# with half their result and below 0 with more of it.
+@pytest.mark.parametrize(("z", "least"), [(0.0, 1.0), (0.9, 0.0), (1.5, 0.25), (3.6, -0.042)])
+def test_a_step_is_refused_before_it_is_unstable(z, least):
+    exact = math.sqrt(2.0 * (1.0 + least))  # of h omega, for Euler
+
+    def stable(part: float, omega: float = OMEGA) -> bool:
+        dt = part * exact / OMEGA
+        return substeps.stays_stable(dt, omega, z / dt)
+
+    assert not stable(0.9999) and stable(0.97)
+    assert not stable(1e-3, math.inf) and not stable(1e-3, math.nan)
 
 
 def test_a_frame_keeps_its_stages_until_the_margin_of_the_damping_is_used_up():
     dt = 1e-3
-    rate = 3.0 / (MARGIN * dt)  # two stages are stable up to 3, see forces.damp
-    assert substeps.stays_damped(dt, 0.999 * rate, 0.999 * MARGIN * rate)
-    assert not substeps.stays_damped(dt, 0.999 * rate, 1.001 * MARGIN * rate)
+    rate = 4.0 / (MARGIN * dt)  # two stages, whose share is chosen for 4
+    assert substeps.stays_damped(dt, rate, 0.999 * MARGIN * rate)
+    assert not substeps.stays_damped(dt, rate, 1.001 * MARGIN * rate)
     assert substeps.stays_damped(dt, 0.0, 0.0)
 
 

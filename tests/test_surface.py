@@ -101,7 +101,7 @@ def test_both_sides_of_the_balanced_search_meet(rng, stages, find_contacts, reco
 
 
 def nodal_forces(model, x: np.ndarray) -> np.ndarray:
-    f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+    f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
     ones = wp.full(model.n_tet, 1, dtype=int)
     forces.internal_forces(model, wp.array(x, dtype=wp.vec3), ones, f_tet)
     f = np.zeros((model.n_vert, 3))

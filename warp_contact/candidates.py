@@ -49,11 +49,11 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
 def track(model: Model, x: wp.array, work: Work, hold: bool = False) -> None:
     """Let the bodies go on to ``x``, where candidates are looked at.
 
-    ``n_place`` is 0 then, unless what has a place is to ``hold`` it.
+    ``n_new`` is 0 then, and ``n_place``, unless what has a place is to ``hold`` it.
     """
     c = work.candidates
     _move(model, x, work)
-    outputs = [c.motion, c.pace, c.way, work.n_place]
+    outputs = [c.motion, c.pace, c.way, work.n_place, work.n_new]
     wp.launch(candidates.go_on, dim=model.n_body, inputs=[hold], outputs=outputs)
 
 

@@ -45,7 +45,7 @@ def find_crossings(
         inputs=[hold, fresh, work.candidates.skin, c.n, c.pair, c.items, c.item, work.surface.id]
         + [model.tris, model.edges, model.vert_body, model.body_edge]
         + [work.candidates.pace, work.candidates.way, x0, x],
-        outputs=[c.wake, work.place, work.crossing, work.crossing_at, work.n_place],
+        outputs=[c.wake, work.place, work.crossing, work.crossing_at] + [work.n_place, work.n_new],
     )
     wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)
 

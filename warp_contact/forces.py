@@ -8,10 +8,12 @@ from warp_contact.kernels import motion
 from warp_contact.types import Model
 
 MARGIN = 1.1  # on the damping rate, which is estimated and grows within a frame
+ROOM = 0.95  # of the range of the stages that is used: at its end they do not damp
+SHARE = 0.5, 0.78  # least and largest: fast modes turn round at a sixth of their speed at most
 
 
 def internal_forces(model: Model, x: wp.array, mask: wp.array, f_tet: wp.array) -> None:
-    """Set the rows of ``f_tet`` [N], shape (n_tet, 4), where ``mask`` is not 0.
+    """Set ``f_tet`` [N], shape (4 n_tet,), of the tets where ``mask`` is not 0.
 
     Undamped forces on the corners of each tet at the positions ``x`` [m]. ``motion.gather`` and
     ``motion.predict`` sum them over the tets of a vertex. One launch per material model.
@@ -68,13 +70,14 @@ def damp(
     f_tet: wp.array,
     scratch: tuple[wp.array, wp.array],
     stages: int,
+    share: wp.array,
 ) -> None:
     """Damp ``v`` [m/s] over ``dt`` [s], shape (1,), at fixed positions ``x`` [m].
 
-    Solves M dv/dt = -C(x) v in ``stages`` stages of ``motion.relax``: stable for
-    2 dt lambda_max(M^-1 C) <= stages^2 + stages, see ``stages_for``. Momentum is kept, no mode
-    grows or turns round, vertices with ``inv_mass`` [1/kg] 0 keep their velocity. Scratch:
-    ``f_tet`` (n_tet, 4) and two arrays (n_vert,). Without a damped body nothing is launched.
+    Solves M dv/dt = -C(x) v in ``stages`` stages of ``motion.relax``, whose result counts by
+    ``share`` [-], shape (1,): no mode grows for dt lambda_max(M^-1 C) up to ``reach``. Momentum is
+    kept, vertices with ``inv_mass`` [1/kg] 0 keep their velocity. Scratch:
+    ``f_tet`` (4 n_tet,) and two arrays (n_vert,). Without a damped body nothing is launched.
     """
     if stages == 0 or not any(e.damped for e in model.elements):
         return
@@ -87,7 +90,7 @@ def damp(
         wp.launch(
             motion.relax,
             dim=model.n_vert,
-            inputs=[model.vt_start, model.vt_corner, f_tet, inv_mass, dt, j, stages, v],
+            inputs=[model.vt_start, model.vt_corner, f_tet, inv_mass, dt, j, stages, share, v],
             outputs=[last, before, out],
         )
         last, before = out, last
@@ -96,4 +99,27 @@ def damp(
 def stages_for(rate: float, dt: float) -> int:
     """Return the stages that ``damp`` needs for lambda_max ``rate`` [1/s] and step ``dt`` [s]."""
     z = MARGIN * rate * dt
-    return math.ceil(0.5 * (math.sqrt(1.0 + 8.0 * z) - 1.0))
+    stages = 0 if z <= 0.0 else 1
+    while reach(stages, SHARE[1]) < z:
+        stages += 1
+    return stages
+
+
+def share_for(rate: float, dt: float) -> float:
+    """Return the share that ``damp`` needs then: the less, the further no mode turns round."""
+    stages = stages_for(rate, dt)
+    needed = MARGIN * rate * dt / reach(stages, 1.0) if stages > 1 else 0.0
+    return max(SHARE[0], needed)
+
+
+def reach(stages: int, share: float) -> float:
+    """Largest dt lambda_max of ``stages`` whose result counts by ``share``."""
+    return float(stages) if stages < 2 else ROOM * share * (stages * stages + stages)
+
+
+def longest_step(stages: int, share: float) -> float:
+    """Longest stable step times the frequency of a mode, whichever way it is damped.
+
+    (h w)^2 < 2 (1 + p) with the least p of kernels/motion.py, as P_s > -1/2 within ``ROOM``.
+    """
+    return 2.0 if stages == 0 else math.sqrt(2.0 if stages == 1 else 4.0 - 3.0 * share)

@@ -137,7 +137,7 @@ class Meter:
     def _forces(self, x: wp.array) -> np.ndarray:
         """Internal forces and weight [N] of the mobile vertices, shape (n_vert, 3)."""
         model = self.model
-        f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+        f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
         f = wp.zeros(model.n_vert, dtype=wp.vec3)
         internal_forces(model, x, wp.full(model.n_tet, 1, dtype=int), f_tet)
         wp.launch(

@@ -13,7 +13,7 @@ from warp_contact.assemble import assemble
 from warp_contact.diagnosis import lost_vertex, vertex_name
 from warp_contact.errors import SimulationError
 from warp_contact.fields import contact_fields
-from warp_contact.forces import stages_for
+from warp_contact.forces import share_for, stages_for
 from warp_contact.measure import Measure, Meter
 from warp_contact.pace import Pace
 from warp_contact.progress import Progress
@@ -160,7 +160,7 @@ class Simulation:
                     omega, rate = 2.0 * omega, 2.0 * rate
                     continue
                 after = self._spectrum.rates(self.state.x)
-                stable = self._pace.wanted is not None or stays_stable(dt, after[0], rate > 0.0)
+                stable = self._pace.wanted is not None or stays_stable(dt, after[0], rate)
                 if stable and stays_damped(dt, rate, after[1]):
                     break
                 omega, rate = raised((omega, rate), after)
@@ -287,6 +287,7 @@ class Simulation:
             work.dt.fill_(0.5 * (self._dt - dt))
             solver.kick(self.model, self.state, work)  # velocities lag by half a step
         work.dt.fill_(dt)
+        work.share.fill_(share_for(rate, dt))
         work.contacts.needed.zero_()
         work.deep_found.zero_()
         work.bodies.rebuild()

@@ -35,6 +35,7 @@ def step(
         impulse.keep_edges(work)
 
     def begin() -> None:
+        arrange(model, state.x, work)
         impulse.recall(model, state.v, work)
         exchange()
 
@@ -62,8 +63,7 @@ def step(
     if isinstance(response, Penalty):
         candidates.refresh(model, state.x, state.x, work)
         # Forces belong to the positions they act at.
-        vertex_contacts(model, state.x, state.x, work, False)
-        edge_contacts(model, state.x, state.x, work, False)
+        contacts(model, state.x, state.x, work, False)
         predict(model, state, work, stages)
         wp.capture_if(c.n, lambda: impulse.push(model, state.v, work, response))
         impulse.record(work, unit)
@@ -71,8 +71,7 @@ def step(
     elif isinstance(response, PredictedForce):
         predict(model, state, work, stages)
         candidates.refresh(model, state.x, work.x, work)
-        vertex_contacts(model, state.x, work.x, work, False)  # overlaps may last some steps
-        edge_contacts(model, state.x, work.x, work, False)
+        contacts(model, state.x, work.x, work, False)  # overlaps may last some steps
         wp.capture_if(c.n, lambda: impulse.push_apart(model, work.x, state.v, work))
         impulse.record(work, unit)
         drift(model, state, work, state.x)
@@ -81,6 +80,7 @@ def step(
         candidates.refresh(model, state.x, work.x, work)
         wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
         vertex_contacts(model, state.x, state.x, work, False)
+        wp.capture_if(c.n, partial(arrange, model, state.x, work))
         surface.leftover(model, state.x, work)
         move_surfaces(model, state, work, response, search)
         wp.capture_if(c.n, lambda: impulse.exchange(model, state.v, work))
@@ -110,6 +110,7 @@ def overlaps(model: Model, state: State, work: Work) -> bool:
     work.contacts.needed.zero_()
     candidates.refresh(model, state.x, state.x, work)
     vertex_contacts(model, state.x, state.x, work, False)
+    arrange(model, state.x, work)
     surface.leftover(model, state.x, work)
     return bool(work.found.numpy()[1])
 
@@ -134,7 +135,7 @@ def predict(model: Model, state: State, work: Work, stages: int) -> None:
     """
     if stages > 0:
         scratch, inv_mass = (work.v, work.s), work.awake.inv_mass
-        damp(model, state.x, state.v, inv_mass, work.dt, work.f_tet, scratch, stages)
+        damp(model, state.x, state.v, inv_mass, work.dt, work.f_tet, scratch, stages, work.share)
     kick(model, state, work)
 
 
@@ -143,8 +144,24 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
     wp.launch(motion.advance, dim=model.n_vert, inputs=[work.dt, state.x, state.v], outputs=[out])
 
 
+def contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
+    """Stages 1 and 2: all contacts at the positions ``x``, in a step from ``x0``."""
+    vertex_contacts(model, x0, x, work, fresh)
+    edge_contacts(model, x0, x, work, fresh)
+    wp.capture_if(work.contacts.n, partial(arrange, model, x0, work))
+
+
+def arrange(model: Model, x0: wp.array, work: Work, first: wp.array | None = None) -> None:
+    """Order the contacts by vertex, and set what the impulses need.
+
+    None has an impulse then, or those before the ``first`` new one, shape (1,), keep theirs.
+    """
+    depth.contacts_by_vertex(model, work)
+    impulse.begin(model, x0, work, work.none if first is None else first)
+
+
 def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Stages 1 and 2: contacts of vertices inside other bodies at the positions ``x``."""
+    """Records of the vertices inside other bodies at the positions ``x``."""
 
     def find() -> None:
         detect.find_hits(model, x, work)
@@ -153,8 +170,6 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
     def make_contacts() -> None:
         depth.hit_depths(model, x, work)
         depth.vertex_contacts(model, x0, x, work, fresh)
-        depth.contacts_by_vertex(model, work)
-        impulse.begin(model, x0, work, work.none)
 
     def none() -> None:
         work.n_hit.zero_()
@@ -166,26 +181,23 @@ def vertex_contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: 
 def edge_contacts(
     model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, hold: bool = False
 ) -> None:
-    """Stages 1 and 2: contacts of edges across other bodies at ``x``.
+    """Records of the edges across other bodies at ``x``, behind those of the vertices.
 
-    ``hold``: those that the step has already stay, with their impulses.
+    ``hold``: those that the step has already stay as they are, with their impulses, and new ones
+    are arranged with them.
     """
     look = partial(detect.find_crossings, model, x0, x, work, fresh, hold)
     wp.capture_if(work.candidates.edges.n, look, work.n_crossing.zero_)
 
-    def append() -> None:
-        append_edges(model, x0, work)
-        if hold:
-            impulse.recall_edges(work)
+    def add() -> None:
+        depth.edge_contacts(model, x0, work)
+        arrange(model, x0, work, work.n_hit)
+        impulse.recall_edges(work)
 
-    wp.capture_if(work.n_crossing, append)
-
-
-def append_edges(model: Model, x0: wp.array, work: Work) -> None:
-    """Make contacts of the crossings, behind those of the vertices."""
-    depth.edge_contacts(model, x0, work)
-    depth.contacts_by_vertex(model, work)
-    impulse.begin(model, x0, work, work.n_hit)
+    if hold:
+        wp.capture_if(work.n_new, add)
+    else:
+        wp.capture_if(work.n_crossing, partial(depth.edge_contacts, model, x0, work))
 
 
 def hold_edges(model: Model, x0: wp.array, work: Work, search: bool) -> None:
@@ -196,7 +208,7 @@ def hold_edges(model: Model, x0: wp.array, work: Work, search: bool) -> None:
 
     def hold() -> None:
         detect.hold_crossings(model, x0, work)
-        wp.capture_if(work.n_crossing, partial(append_edges, model, x0, work))
+        wp.capture_if(work.n_crossing, partial(depth.edge_contacts, model, x0, work))
 
     def none() -> None:
         work.place.fill_(-1)
@@ -234,8 +246,7 @@ def move_surfaces(
         close(surface.DEEP)
         # Where vertices came to lie, their triangles may be others than those of stage 2, and edges
         # may cross that it could not see.
-        vertex_contacts(model, state.x, state.x, work, not search)
-        edge_contacts(model, state.x, state.x, work, not search)
+        contacts(model, state.x, state.x, work, not search)
         surface.leftover(model, state.x, work)
         wp.capture_if(work.found[0:1], partial(close, surface.DEEP if search else math.inf))
 

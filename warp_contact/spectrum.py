@@ -47,7 +47,7 @@ class Spectrum:
         self._coef = wp.empty((2 * DEPTH + 1, model.n_body), dtype=wp.float64)
         self._ritz = wp.zeros((model.n_body, DEPTH), dtype=float)
         self._basis = wp.zeros((DEPTH + 1, model.n_vert), dtype=wp.vec3)
-        self._f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+        self._f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
         self._x = wp.empty(model.n_vert, dtype=wp.vec3)
         noise = np.random.default_rng(SEED).standard_normal((model.n_vert, 3))
         self._noise = wp.array(_unit(noise, model), dtype=wp.vec3)

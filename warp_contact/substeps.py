@@ -14,11 +14,10 @@ needs; a frame that fails is repeated at the rates of its end.
 
 import math
 
-from warp_contact.forces import MARGIN, stages_for
+from warp_contact.forces import longest_step, reach, share_for, stages_for
 
 SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
-UNSTABLE = 1.95  # step times omega at the end of a frame above which it is repeated
-UNSTABLE_DAMPED = 1.4  # the same with damping, see kernels/motion.py
+UNSTABLE = 0.98  # of the longest stable step at the end of a frame, above which it is repeated
 RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
 TRAVEL = 0.1  # of the shortest mean edge: the same, for the tets where something strikes
@@ -60,14 +59,17 @@ def with_penalty(omega: float, stiffness: float, inv_mass: float) -> float:
     return math.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
 
 
-def stays_stable(dt: float, omega: float, damped: bool) -> bool:
-    """Whether a step ``dt`` [s] is stable at the frequency ``omega`` [1/s] of its frame's end."""
-    return dt * omega <= (UNSTABLE_DAMPED if damped else UNSTABLE)
+def stays_stable(dt: float, omega: float, rate: float) -> bool:
+    """Whether a step ``dt`` [s] is stable at the frequency ``omega`` [1/s] of its frame's end.
+
+    With the damping of a ``rate`` [1/s] at its start.
+    """
+    return dt * omega <= UNSTABLE * longest_step(stages_for(rate, dt), share_for(rate, dt))
 
 
 def stays_damped(dt: float, rate: float, after: float) -> bool:
     """Whether the stages for the damping ``rate`` [1/s] do for that ``after`` the frame too."""
-    return stages_for(after / MARGIN, dt) <= stages_for(rate, dt)
+    return after * dt <= reach(stages_for(rate, dt), share_for(rate, dt))
 
 
 def raised(before: tuple[float, float], after: tuple[float, float]) -> tuple[float, float]:

@@ -18,10 +18,11 @@ class Work:
     Attributes:
         capacity: what there is room for
         dt: the step [s], shape (1,)
+        share: of the stages of the damping [-], shape (1,)
         steps: how many the frame still has, shape (1,)
         awake: what moves
         mask: tets that touch the deformation region, shape (n_tet,)
-        f_tet: forces on the corners of each tet [N], shape (n_tet, 4)
+        f_tet: forces on the corners of each tet [N], shape (4 n_tet,)
         x: predicted positions, then those before stage 4 [m], shape (n_vert,)
         v: scratch of the damping [m/s], shape (n_vert,)
         lower, upper: boxes of the bodies [m], shape (n_body,)
@@ -37,6 +38,7 @@ class Work:
         hit_vert, hit_body, hit_layer, hit_depth, hit_dir: the hits, shape (capacity.contacts,)
         crossing: contacts of candidate edges in any order, shape (capacity.contacts,)
         n_place: places taken, some of them no longer in use, shape (1,)
+        n_new: contacts of edges that the last look found, without those held, shape (1,)
         place: that of the first of each candidate edge, shape (capacity.edges,)
         source: place of each contact of an edge, shape (capacity.contacts,)
         stirred, served: the last sweep that changed the velocity of a vertex, and that added
@@ -65,6 +67,7 @@ class Work:
 
     capacity: Capacity
     dt: wp.array
+    share: wp.array
     steps: wp.array
     awake: Awake
     mask: wp.array
@@ -90,6 +93,7 @@ class Work:
     hit_dir: wp.array
     crossing: wp.array
     n_place: wp.array
+    n_new: wp.array
     place: wp.array
     source: wp.array
     stirred: wp.array
@@ -145,10 +149,11 @@ def allocate_work(
     return Work(
         capacity=capacity,
         dt=wp.zeros(1, dtype=float),
+        share=wp.zeros(1, dtype=float),
         steps=wp.zeros(1, dtype=int),
         awake=awake or everything(model),
         mask=_ints(model.n_tet),
-        f_tet=wp.zeros((model.n_tet, 4), dtype=wp.vec3),
+        f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=_vectors(n),
         v=_vectors(n),
         lower=lower,
@@ -156,7 +161,7 @@ def allocate_work(
         tri_lower=tri_lower,
         tri_upper=tri_upper,
         bodies=bodies,
-        surface=wp.Bvh(tri_lower, tri_upper, groups=model.tri_body),
+        surface=wp.Bvh(tri_lower, tri_upper, groups=model.tri_body, leaf_size=8),
         near=near,
         key=_ints(n),
         cell_start=_ints(2 * n + 2),
@@ -170,6 +175,7 @@ def allocate_work(
         hit_dir=_vectors(m),
         crossing=wp.zeros(m, dtype=EdgeContact),
         n_place=_ints(1),
+        n_new=_ints(1),
         place=_ints(capacity.edges),
         source=_ints(m),
         stirred=_ints(n),

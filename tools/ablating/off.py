@@ -42,7 +42,7 @@ def constant(owner: ModuleType, name: str, value, *users: ModuleType) -> Callabl
 
 def without_repeats():
     """A context in which the stable step of the start of a frame is that of its end too."""
-    return mock.patch.multiple(substeps, UNSTABLE=math.inf, UNSTABLE_DAMPED=math.inf)
+    return mock.patch.object(substeps, "UNSTABLE", math.inf)
 
 
 def nothing(*args) -> None:
@@ -136,7 +136,8 @@ def damp_last(model, state, work, stages) -> None:
     solver.kick(model, state, work)
     if stages > 0:
         scratch = work.v, work.s
-        forces.damp(model, state.x, state.v, model.inv_mass, work.dt, work.f_tet, scratch, stages)
+        given = work.dt, work.f_tet, scratch, stages, work.share
+        forces.damp(model, state.x, state.v, model.inv_mass, *given)
     solver.drift(model, state, work, work.x)
 
 

@@ -21,6 +21,7 @@ STAGES = {  # the functions of a stage; the outermost call counts
     "vertex_contacts": ((solver, "vertex_contacts"),),
     "edge_contacts": ((solver, "edge_contacts"), (solver, "hold_edges")),
     "impulses": (
+        (solver, "arrange"),
         (impulse, "recall"),
         (impulse, "exchange"),
         (impulse, "push"),

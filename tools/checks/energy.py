@@ -68,7 +68,7 @@ def first_mode(sim: wc.Simulation) -> tuple[float, np.ndarray]:
     """Angular frequency [1/s] and shape of the softest mode, largest entry 1."""
     model = sim.model
     n = model.n_vert
-    f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3)
+    f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
     k = np.empty((3 * n, 3 * n))
     corners = model.tets.numpy().ravel()
     for row, unit in enumerate(np.eye(3 * n, dtype=np.float32)):

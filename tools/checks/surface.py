@@ -106,6 +106,7 @@ def settle(sim: wc.Simulation, work: Work) -> int:
         solver.vertex_contacts(model, state.x, state.x, work, fresh=False)
         if sim.response.search == "balanced":
             solver.edge_contacts(model, state.x, state.x, work, fresh=False)
+        solver.arrange(model, state.x, work)
         surface.leftover(model, state.x, work)
         if not work.found.numpy()[0]:
             return call

@@ -37,7 +37,7 @@ def relax(sim: wc.Simulation, omega: float, frames: int):
 def calm(sim: wc.Simulation, factor: float) -> None:
     """Multiply the velocities of mobile vertices, taken at the time of the positions."""
     model = sim.model
-    f_tet = wp.zeros((model.n_tet, 4), dtype=wp.vec3, device=sim.device)
+    f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3, device=sim.device)
     ones = wp.full(model.n_tet, 1, dtype=int, device=sim.device)
     with wp.ScopedDevice(sim.device):
         forces.internal_forces(model, sim.state.x, ones, f_tet)

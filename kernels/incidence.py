@@ -32,12 +32,10 @@ def total_contacts(
     capacity: int,
     # out
     n_contact: wp.array[int],  # (1,)
-    n_touched: wp.array[int],  # (1,) 0: ``sort_entries`` counts them
     # out, added to
     needed: wp.array[int],  # largest number seen, to grow the capacity
 ):
     """One thread: the number of contacts."""
-    n_touched[0] = 0
     n = hits[0] + crossings[0]
     n_contact[0] = wp.min(n, capacity)
     if wp.max(n, places[0]) > capacity:
@@ -51,10 +49,14 @@ def count_entries(
     n_contact: wp.array[int],  # (1,)
     vert: wp.array2d[int],  # (capacity, 5)
     coef: wp.array2d[float],  # (capacity, 5)
+    # out
+    n_touched: wp.array[int],  # (1,) 0: ``sort_entries`` counts them
     # out, added to
     count: wp.array[int],  # (n_vert + 1,)
 ):
     """For each contact."""
+    if wp.tid() == 0:
+        n_touched[0] = 0
     for c in range(wp.tid(), n_contact[0], threads):
         for k in range(5):
             if takes_part(c, k, vert, coef):

@@ -63,6 +63,42 @@ def test_a_contact_of_two_edges_goes_on_where_they_are_closest(lying):
         assert 0.0 <= between @ normal < 1e-3 * 0.1  # the resting gap
 
 
+def arranged(work) -> dict[str, np.ndarray]:
+    """What the impulses see of the contacts."""
+    c, n = work.contacts, int(work.contacts.n.numpy()[0])
+    start = c.start.numpy().copy()
+    found = {k: getattr(c, k).numpy()[:n].copy() for k in ("vert", "coef", "weight", "lam")}
+    touched = np.sort(c.touched.numpy()[: c.n_touched.numpy()[0]])
+    return found | {
+        "start": start,
+        "entry": c.entry.numpy()[: start[-1]].copy(),
+        "touched": touched,
+    }
+
+
+def test_a_look_that_finds_nothing_new_leaves_the_contacts_alone(lying):
+    work, x = lying._work, lying.state.x
+    go_on(lying)
+    before = arranged(work)
+    assert (before["lam"] > 0.0).any()
+    solver.edge_contacts(lying.model, x, x, work, True, hold=True)
+    assert work.n_new.numpy()[0] == 0
+    after = arranged(work)
+    for name, value in before.items():
+        np.testing.assert_array_equal(after[name], value)
+
+
+def test_contacts_may_be_arranged_more_than_once(lying):
+    work, x = lying._work, lying.state.x
+    go_on(lying)
+    solver.arrange(lying.model, x, work)
+    before = arranged(work)
+    assert len(before["touched"]) == np.count_nonzero(np.diff(before["start"])) > 0
+    solver.arrange(lying.model, x, work)
+    for name, value in arranged(work).items():
+        np.testing.assert_array_equal(value, before[name])
+
+
 def test_the_same_contact_carries_the_beam_from_frame_to_frame(lying):
     forces, names = [], []
     for _ in lying.frames(12):  # later it has rolled off the edge

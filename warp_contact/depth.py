@@ -66,11 +66,12 @@ def edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
 
 
 def contacts_by_vertex(model: Model, work: Work) -> None:
-    """Set ``contacts.start``, ``entry`` and ``touched``, once after contacts were counted."""
+    """Set ``contacts.start``, ``entry`` and ``touched``."""
     c = work.contacts
     m = work.capacity.contacts
     c.start.zero_()
-    launch_over(incidence.count_entries, m, inputs=[c.n, c.vert, c.coef], outputs=[c.start])
+    outputs = [c.n_touched, c.start]
+    launch_over(incidence.count_entries, m, inputs=[c.n, c.vert, c.coef], outputs=outputs)
     wp.utils.array_scan(c.start, c.start, inclusive=True)
     launch_over(
         incidence.fill_entries,
@@ -92,5 +93,5 @@ def _count(work: Work, crossings: wp.array, places: wp.array) -> None:
         incidence.total_contacts,
         dim=1,
         inputs=[work.n_hit, crossings, places, work.capacity.contacts],
-        outputs=[work.contacts.n, work.contacts.n_touched, work.contacts.needed[0:1]],
+        outputs=[work.contacts.n, work.contacts.needed[0:1]],
     )

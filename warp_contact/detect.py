@@ -32,7 +32,7 @@ def find_hits(model: Model, x: wp.array, work: Work) -> None:
 def find_crossings(
     model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, hold: bool = False
 ) -> None:
-    """Set ``crossing_at``, ``place`` and ``crossing``: edges across a body at ``x``.
+    """Set ``crossing_at``, ``place``, ``crossing`` and ``n_new``: edges across a body at ``x``.
 
     The step begins at ``x0``; ``fresh``: no overlap is older than that. ``hold``: add to what is
     there.

@@ -9,7 +9,7 @@ from warp_contact.types import Model
 
 MARGIN = 1.1  # on the damping rate, which is estimated and grows within a frame
 ROOM = 0.95  # of the range of the stages that is used: at its end they do not damp
-SHARE = 0.5, 0.78  # least and largest: fast modes turn round at a sixth of their speed at most
+SHARE = 0.5, 7.0 / 9.0  # least and largest: modes turn round at a sixth of their speed at most
 
 
 def internal_forces(model: Model, x: wp.array, mask: wp.array, f_tet: wp.array) -> None:
@@ -99,27 +99,29 @@ def damp(
 def stages_for(rate: float, dt: float) -> int:
     """Return the stages that ``damp`` needs for lambda_max ``rate`` [1/s] and step ``dt`` [s]."""
     z = MARGIN * rate * dt
-    stages = 0 if z <= 0.0 else 1
-    while reach(stages, SHARE[1]) < z:
-        stages += 1
-    return stages
+    if z <= reach(1, SHARE[1]):
+        return 1 if z > 0.0 else 0
+    return max(2, math.ceil(0.5 * (math.sqrt(1.0 + 4.0 * z / (ROOM * SHARE[1])) - 1.0)))
 
 
 def share_for(rate: float, dt: float) -> float:
-    """Return the share that ``damp`` needs then: the less, the further no mode turns round."""
+    """Return the least share that reaches then: with less, fast modes turn round less."""
     stages = stages_for(rate, dt)
     needed = MARGIN * rate * dt / reach(stages, 1.0) if stages > 1 else 0.0
     return max(SHARE[0], needed)
 
 
 def reach(stages: int, share: float) -> float:
-    """Largest dt lambda_max of ``stages`` whose result counts by ``share``."""
+    """Largest dt lambda_max of ``stages`` whose result counts by ``share``.
+
+    One stage has p = 1 - z whatever its share, above 0 up to 1.
+    """
     return float(stages) if stages < 2 else ROOM * share * (stages * stages + stages)
 
 
 def longest_step(stages: int, share: float) -> float:
     """Longest stable step times the frequency of a mode, whichever way it is damped.
 
-    (h w)^2 < 2 (1 + p) with the least p of kernels/motion.py, as P_s > -1/2 within ``ROOM``.
+    (h w)^2 < 2 (1 + p) with the least p of kernels/motion.py, as P_s >= -1/2 within ``ROOM``.
     """
     return 2.0 if stages == 0 else math.sqrt(2.0 if stages == 1 else 4.0 - 3.0 * share)

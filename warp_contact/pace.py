@@ -49,11 +49,11 @@ class Pace:
         Raises:
             SimulationError: no step is stable
         """
-        if self.wanted:
-            return self.wanted
         if not np.isfinite(omega):
             tet = flattest_tet(self._model, state.x)
             raise SimulationError(f"frame {frame}: {tet} is too flat: no step is stable")
+        if self.wanted:
+            return self.wanted
         omega, speed = self._with_response(omega), self._speed(state)
         sizes = self._thickness, self._edge
         per_second = substeps.steps_per_second(omega, speed, *sizes, search or self._leaves)

@@ -79,8 +79,7 @@ def step(
         predict(model, state, work, stages)
         candidates.refresh(model, state.x, work.x, work)
         wp.copy(state.x, work.x)  # the paper: displacement first, then velocities
-        vertex_contacts(model, state.x, state.x, work, False)
-        wp.capture_if(c.n, partial(arrange, model, state.x, work))
+        contacts(model, state.x, state.x, work, False, edges=False)
         surface.leftover(model, state.x, work)
         move_surfaces(model, state, work, response, search)
         wp.capture_if(c.n, lambda: impulse.exchange(model, state.v, work))
@@ -109,8 +108,7 @@ def overlaps(model: Model, state: State, work: Work) -> bool:
     work.dt.fill_(1.0)
     work.contacts.needed.zero_()
     candidates.refresh(model, state.x, state.x, work)
-    vertex_contacts(model, state.x, state.x, work, False)
-    arrange(model, state.x, work)
+    contacts(model, state.x, state.x, work, False, edges=False)
     surface.leftover(model, state.x, work)
     return bool(work.found.numpy()[1])
 
@@ -144,17 +142,20 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
     wp.launch(motion.advance, dim=model.n_vert, inputs=[work.dt, state.x, state.v], outputs=[out])
 
 
-def contacts(model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool) -> None:
-    """Stages 1 and 2: all contacts at the positions ``x``, in a step from ``x0``."""
+def contacts(
+    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, edges: bool = True
+) -> None:
+    """Stages 1 and 2: contacts at the positions ``x``, in a step from ``x0``."""
     vertex_contacts(model, x0, x, work, fresh)
-    edge_contacts(model, x0, x, work, fresh)
+    if edges:
+        edge_contacts(model, x0, x, work, fresh)
     wp.capture_if(work.contacts.n, partial(arrange, model, x0, work))
 
 
 def arrange(model: Model, x0: wp.array, work: Work, first: wp.array | None = None) -> None:
     """Order the contacts by vertex, and set what the impulses need.
 
-    None has an impulse then, or those before the ``first`` new one, shape (1,), keep theirs.
+    Without ``first``, shape (1,), no contact has an impulse yet; else those before it keep theirs.
     """
     depth.contacts_by_vertex(model, work)
     impulse.begin(model, x0, work, work.none if first is None else first)
@@ -187,7 +188,12 @@ def edge_contacts(
     are arranged with them.
     """
     look = partial(detect.find_crossings, model, x0, x, work, fresh, hold)
-    wp.capture_if(work.candidates.edges.n, look, work.n_crossing.zero_)
+
+    def none() -> None:
+        work.n_crossing.zero_()
+        work.n_new.zero_()
+
+    wp.capture_if(work.candidates.edges.n, look, none)
 
     def add() -> None:
         depth.edge_contacts(model, x0, work)

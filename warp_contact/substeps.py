@@ -1,6 +1,6 @@
 """How many equal steps a frame takes, and whether they proved enough.
 
-    stable  = omega / (2 SAFETY)                     [1/s]  2 / omega is the longest stable step
+    stable  = omega / (2 SAFETY)                     [1/s]  2 / omega is stable without damping
     passing = u / (REACH t)                          [1/s]  nothing jumps through a body
     gentle  = min(u / (TRAVEL e), PATIENCE stable)   [1/s]  an impact does not crush a tet at once
     n       = max(ceil(max(stable, passing, gentle) / fps), floor(KEEP n_last), 1)
@@ -8,8 +8,8 @@
 omega is the largest frequency of the elastic forces [1/s], u the largest relative speed [m/s], t
 the thickness of the thinnest body [m] and e the shortest mean edge of a body [m]. They are those at
 the start of the frame. While there may be overlaps from before, LINGERING stands for TRAVEL. At its
-end the step must still be below ``UNSTABLE`` / omega, and damped in as many stages as it then
-needs; a frame that fails is repeated at the rates of its end.
+end the step must still be below ``UNSTABLE`` of ``forces.longest_step`` / omega, and its damping
+within ``forces.reach``; a frame that fails is repeated at the rates of its end.
 """
 
 import math
@@ -68,7 +68,7 @@ def stays_stable(dt: float, omega: float, rate: float) -> bool:
 
 
 def stays_damped(dt: float, rate: float, after: float) -> bool:
-    """Whether the stages for the damping ``rate`` [1/s] do for that ``after`` the frame too."""
+    """Whether stages and share for the damping ``rate`` [1/s] do for that ``after`` it too."""
     return after * dt <= reach(stages_for(rate, dt), share_for(rate, dt))
 
 

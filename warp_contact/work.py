@@ -149,7 +149,7 @@ def allocate_work(
     return Work(
         capacity=capacity,
         dt=wp.zeros(1, dtype=float),
-        share=wp.zeros(1, dtype=float),
+        share=wp.full(1, 1.0, dtype=float),
         steps=wp.zeros(1, dtype=int),
         awake=awake or everything(model),
         mask=_ints(model.n_tet),

@@ -61,7 +61,7 @@ def by_mass(model, state, work, response, search, move=solver.move_surfaces) -> 
 
 def blind(model, state, work, response, search, move=solver.move_surfaces) -> None:
     """In the place of ``solver.move_surfaces``: what the closure moved is not looked at."""
-    with mock.patch.multiple(solver, vertex_contacts=nothing, edge_contacts=nothing):
+    with mock.patch.object(solver, "contacts", nothing):
         move(model, state, work, response, search)
 
 

@@ -12,7 +12,7 @@ import warp as wp
 from benching.memory import Snapshot, held
 from benching.stages import OTHER, STAGES, StageTimer
 from warp_contact import Simulation, solver
-from warp_contact.forces import stages_for
+from warp_contact.forces import share_for, stages_for
 
 WORK = 60_000  # vertices times steps of a window
 LEAST, MOST = 8, 64  # steps
@@ -121,6 +121,7 @@ class _Window:
         self._steps = steps
         self._work, self._device = sim._work, sim.device
         stages = stages_for(sim._rates[1], sim._dt)
+        sim._work.share.fill_(share_for(sim._rates[1], sim._dt))
         self._arguments = sim.model, sim.state, sim._work, sim.response, stages
         self._arguments += sim._search, sim._unit
         self._work.contacts.needed.zero_()

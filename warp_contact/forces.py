@@ -124,4 +124,4 @@ def longest_step(stages: int, share: float) -> float:
 
     (h w)^2 < 2 (1 + p) with the least p of kernels/motion.py, as P_s >= -1/2 within ``ROOM``.
     """
-    return 2.0 if stages == 0 else math.sqrt(2.0 if stages == 1 else 4.0 - 3.0 * share)
+    return 2.0 if stages == 0 else math.sqrt(2.0 if stages == 1 else min(2.0, 4.0 - 3.0 * share))

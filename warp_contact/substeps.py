@@ -17,7 +17,7 @@ import math
 from warp_contact.forces import longest_step, reach, share_for, stages_for
 
 SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
-UNSTABLE = 0.98  # of the longest stable step at the end of a frame, above which it is repeated
+UNSTABLE = 0.99  # of the longest stable step at the end of a frame, above which it is repeated
 RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
 TRAVEL = 0.1  # of the shortest mean edge: the same, for the tets where something strikes

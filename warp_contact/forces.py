@@ -122,6 +122,7 @@ def reach(stages: int, share: float) -> float:
 def longest_step(stages: int, share: float) -> float:
     """Longest stable step times the frequency of a mode, whichever way it is damped.
 
-    (h w)^2 < 2 (1 + p) with the least p of kernels/motion.py, as P_s >= -1/2 within ``ROOM``.
+    (h w)^2 < 2 (1 + p) with the least p of kernels/motion.py, as P_s >= -1/2 within ``ROOM``, or
+    with p = 0 where that is less.
     """
     return 2.0 if stages == 0 else math.sqrt(2.0 if stages == 1 else min(2.0, 4.0 - 3.0 * share))

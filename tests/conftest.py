@@ -159,10 +159,7 @@ def _find_contacts(model, work, x0, x=None, edges=False, fresh=False) -> SimpleN
 
     x = x0 if x is None else x
     candidates.refresh(model, x0, x, work)
-    solver.vertex_contacts(model, x0, x, work, fresh)
-    if edges:
-        solver.edge_contacts(model, x0, x, work, fresh)
-    solver.arrange(model, x0, work)
+    solver.contacts(model, x0, x, work, fresh, edges)
     assert not work.contacts.needed.numpy().any()
     return _records(work)
 

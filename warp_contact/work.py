@@ -10,6 +10,8 @@ from warp_contact.kernels.near import MANY, Near
 from warp_contact.types import Awake, Candidates, Capacity, Contacts, Model, Pairs, State
 from warp_contact.warm import Warm, allocate
 
+LEAF = 8  # triangles in a leaf: to ask for the few near a vertex takes a quarter less than with 1
+
 
 @dataclass
 class Work:
@@ -161,7 +163,7 @@ def allocate_work(
         tri_lower=tri_lower,
         tri_upper=tri_upper,
         bodies=bodies,
-        surface=wp.Bvh(tri_lower, tri_upper, groups=model.tri_body, leaf_size=8),
+        surface=wp.Bvh(tri_lower, tri_upper, groups=model.tri_body, leaf_size=LEAF),
         near=near,
         key=_ints(n),
         cell_start=_ints(2 * n + 2),

@@ -103,10 +103,8 @@ def settle(sim: wc.Simulation, work: Work) -> int:
     work.bodies.rebuild()
     for call in range(CALLS):
         candidates.refresh(model, state.x, state.x, work)
-        solver.vertex_contacts(model, state.x, state.x, work, fresh=False)
-        if sim.response.search == "balanced":
-            solver.edge_contacts(model, state.x, state.x, work, fresh=False)
-        solver.arrange(model, state.x, work)
+        edges = sim.response.search == "balanced"
+        solver.contacts(model, state.x, state.x, work, fresh=False, edges=edges)
         surface.leftover(model, state.x, work)
         if not work.found.numpy()[0]:
             return call

@@ -1,4 +1,4 @@
-"""Questions to the surface of one body, answered through the grouped triangle Bvh.
+"""Questions to the surface of one body, answered through the triangle Bvh from its group's root.
 
     first_hit      the first crossing of a segment that enters (or leaves) the body
     first_crossing both, from one query

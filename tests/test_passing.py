@@ -235,16 +235,26 @@ def test_tets_turned_inside_out_are_counted(rng):
     assert (now.volume_ratio <= 0.0) == (now.inverted > 0)
 
 
-def test_a_vertex_in_another_body_without_a_contact_is_unheld(rng):
+def one_over_another(way) -> Simulation:
+    """A block of 16 vertices a face centred over one of 9, 0.05 m above it but for ``way``."""
     scene = Scene(gravity=(0.0, 0.0, 0.0))
     scene.add_body(box(1.0, 2), SOFT)
-    scene.add_body(box(0.5, 3), SOFT, (0.0, 0.0, 0.8))
-    sim = Simulation(scene)
+    scene.add_body(box(0.5, 3), SOFT, np.add((0.0, 0.0, 0.8), way))
+    return Simulation(scene)
+
+
+def test_a_vertex_in_another_body_without_a_contact_is_unheld(rng):
+    sim = one_over_another((0.0, 0.0, 0.0))
     sim.step_frame()
     assert sim.measure().unheld == 0
     move(sim, (*rng.uniform(-0.05, 0.05, 2), -0.05 - rng.uniform(0.02, 0.1)))
     # The lower face of the upper body, and the middle of the upper face of the lower one.
     assert sim.measure().unheld == 16 + 1
+
+
+def test_a_step_holds_what_overlaps_from_the_start(rng):
+    sim = one_over_another((*rng.uniform(-0.05, 0.05, 2), -0.05 - rng.uniform(0.02, 0.1)))
+    assert sim.measure().overlap > 0.0
     sim.step_frame()
     assert sim.measure().unheld == 0
 

@@ -260,14 +260,14 @@ def test_a_simulation_grows_its_buffers_and_loses_nothing(rng, turned):
     ample = Simulation(scene, fps=1000)
     tight = Capacity(*[1] * 7)
     roomy = Capacity(8192, 64, 8192, 65536, 8192, 65536, 65536)
-    tiny._work = allocate_work(tiny.model, tiny.state, tight)
-    ample._work = allocate_work(ample.model, ample.state, roomy)
+    tiny._stepper.use(allocate_work(tiny.model, tiny.state, tight))
+    ample._stepper.use(allocate_work(ample.model, ample.state, roomy))
     for sim in (tiny, ample):
         sim.step_frame()
     np.testing.assert_array_equal(tiny.positions(), ample.positions())
     np.testing.assert_array_equal(tiny.velocities(), ample.velocities())
     assert tiny.measure().forces == ample.measure().forces
-    assert min(astuple(tiny._work.capacity)) > 1
+    assert min(astuple(tiny._stepper.work.capacity)) > 1
 
 
 def pile(rng, turned) -> Scene:
@@ -287,16 +287,15 @@ def test_buffers_that_grow_on_the_way_change_nothing(rng, turned):
     tight, ample = Simulation(scene), Simulation(scene)
     shrunk = -1
     for frame in range(16):
-        before = tight._work.warm  # with the impulses that the next frame starts from
+        before = tight._stepper.work.warm  # with the impulses that the next frame starts from
         held = int(before.n_held.numpy()[0])
         if frame >= 4 and held > 0 and shrunk < 0:
             shrunk = frame
-            tight._work = allocate_work(tight.model, tight.state, Capacity(held, *[1] * 6))
-            warm.copy(tight._work.warm, before)
-            tight._graphs.clear()
+            tight._stepper.use(allocate_work(tight.model, tight.state, Capacity(held, *[1] * 6)))
+            warm.copy(tight._stepper.work.warm, before)
         for sim in (tight, ample):
             # Short steps, which lengthen by a part from frame to frame, not from try to try.
-            sim.substeps = max(sim.substeps, 40)
+            sim._stepper.n = max(sim.substeps, 40)
             sim.step_frame()
         assert tight.substeps == ample.substeps
         np.testing.assert_array_equal(tight.positions(), ample.positions())
@@ -332,7 +331,7 @@ def test_a_deep_overlap_beyond_the_first_buffer_is_searched_all_the_same():
     for k, z in enumerate((1.0, 1.18)):
         scene.add_body(box(0.2, 2), NeoHookean(1e5 * 10**k, 0.3, 1000.0), (0.0, 0.0, z))
     tiny, ample = Simulation(scene, fps=1000), Simulation(scene, fps=1000)
-    tiny._work = allocate_work(tiny.model, tiny.state, Capacity(contacts=4))
+    tiny._stepper.use(allocate_work(tiny.model, tiny.state, Capacity(contacts=4)))
     for sim in (tiny, ample):
         sim.step_frame()
     np.testing.assert_array_equal(tiny.positions(), ample.positions())

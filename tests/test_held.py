@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_contact import NeoHookean, Scene, Simulation, box, impulse, simulation, solver
+from warp_contact import NeoHookean, Scene, Simulation, box, impulse, solver, stepper
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0, damping=2e-3)
 WEIGHT = 0.4 * 0.1 * 0.1 * 1000.0 * 9.81  # of a beam [N]
@@ -25,19 +25,19 @@ def lying(device) -> Simulation:
     sim = Simulation(scene, device=str(device))
     for _ in sim.frames(10):
         pass
-    assert sim._work.n_hit.numpy()[0] == 0
+    assert sim._stepper.work.n_hit.numpy()[0] == 0
     return sim
 
 
 def kept(sim: Simulation) -> np.ndarray:
     """The contacts of edges that the last step leaves to the next."""
-    warm = sim._work.warm
+    warm = sim._stepper.work.warm
     return warm.held.numpy()[: warm.n_held.numpy()[0]]
 
 
 def go_on(sim: Simulation) -> dict[str, np.ndarray]:
     """Begin a step: the records of the contacts that are held, and what they start from."""
-    model, x, work = sim.model, sim.state.x, sim._work
+    model, x, work = sim.model, sim.state.x, sim._stepper.work
     solver.vertex_contacts(model, x, x, work, True)
     solver.hold_edges(model, x, work, search=False)
     solver.arrange(model, x, work)
@@ -77,7 +77,7 @@ def arranged(work) -> dict[str, np.ndarray]:
 
 
 def test_a_look_that_finds_nothing_new_leaves_the_contacts_alone(lying):
-    work, x = lying._work, lying.state.x
+    work, x = lying._stepper.work, lying.state.x
     go_on(lying)
     before = arranged(work)
     assert (before["lam"] > 0.0).any()
@@ -89,7 +89,7 @@ def test_a_look_that_finds_nothing_new_leaves_the_contacts_alone(lying):
 
 
 def test_contacts_may_be_arranged_more_than_once(lying):
-    work, x = lying._work, lying.state.x
+    work, x = lying._stepper.work, lying.state.x
     go_on(lying)
     solver.arrange(lying.model, x, work)
     before = arranged(work)
@@ -125,7 +125,7 @@ def test_what_was_moved_away_is_forgotten(lying, way):
 
 
 def test_without_an_impulse_a_contact_is_not_held(lying):
-    warm = lying._work.warm
+    warm = lying._stepper.work.warm
     held = warm.held.numpy()
     held["kept"][:, 3] = 0.0
     warm.held.assign(held)
@@ -138,8 +138,8 @@ def test_a_frame_that_is_repeated_starts_from_the_same_impulses(lying, tmp_path,
     once.load(tmp_path / "run.npz")
     once.step_frame()
     results = iter((False, True))
-    monkeypatch.setattr(simulation, "stays_stable", lambda *_: next(results))
-    monkeypatch.setattr(simulation, "raised", lambda before, after: before)
+    monkeypatch.setattr(stepper, "stays_stable", lambda *_: next(results))
+    monkeypatch.setattr(stepper, "raised", lambda before, after: before)
     lying.step_frame()
     assert next(results, None) is None
     np.testing.assert_array_equal(lying.positions(), once.positions())
@@ -149,7 +149,8 @@ def test_a_frame_that_is_repeated_starts_from_the_same_impulses(lying, tmp_path,
 
 def test_contacts_that_take_all_the_places_ask_for_more(lying):
     """Those of the last step keep their places also when they are over."""
-    warm, work, room = lying._work.warm, lying._work, lying._work.capacity.contacts
+    work = lying._stepper.work
+    warm, room = work.warm, work.capacity.contacts
     held = warm.held.numpy()
     held[:] = held[0]
     held["kept"][:, 3] = 0.0
@@ -167,7 +168,7 @@ def test_contacts_that_take_all_the_places_ask_for_more(lying):
 
 def test_places_are_counted_from_none_in_every_step(lying):
     """Where no vertex is near, nobody else begins to count."""
-    work = lying._work
+    work = lying._stepper.work
     work.warm.n_held.zero_()
     assert work.candidates.verts.n.numpy()[0] == 0
     for _ in range(2):

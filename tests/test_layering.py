@@ -19,6 +19,7 @@ LADDER = (  # a module imports from lower rungs only
     | {"rest", "fields", "placement", "room"},
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},
     {"solver", "pace"},
+    {"stepper"},
     {"simulation"},
     {"__init__", "commands", "runs"},
     {"cli"},

@@ -23,12 +23,12 @@ def stacked(device) -> Simulation:
 
 
 def test_what_fits_stays(device):
-    assert room.enlarged(stacked(device)._work) is None
+    assert room.enlarged(stacked(device)._stepper.work) is None
 
 
 def test_what_is_more_than_half_full_grows_with_what_did_not_fit(device):
     sim = stacked(device)
-    work = sim._work
+    work = sim._stepper.work
     used = [
         work.contacts.n.numpy()[0],
         (work.pair_key.numpy() >= 0).sum(),
@@ -53,7 +53,7 @@ def test_what_is_more_than_half_full_grows_with_what_did_not_fit(device):
 
 def test_lists_that_grow_together_cost_few_frames(device, monkeypatch):
     sim, grown = stacked(device), []
-    known = sim._work.capacity
+    known = sim._stepper.work.capacity
 
     def enlarged(work, enlarged=room.enlarged):
         capacity = enlarged(work)
@@ -61,11 +61,10 @@ def test_lists_that_grow_together_cost_few_frames(device, monkeypatch):
             grown.append(capacity)
         return capacity
 
-    monkeypatch.setattr("warp_contact.simulation.enlarged", enlarged)
+    monkeypatch.setattr("warp_contact.stepper.enlarged", enlarged)
     least = [max(1, n // 4) for n in astuple(known)]
-    sim._work = allocate_work(sim.model, sim.state, Capacity(*least))
-    sim._graphs.clear()
+    sim._stepper.use(allocate_work(sim.model, sim.state, Capacity(*least)))
     sim.step_frame()
     # In the order of the stages, where one that does not fit hides what comes after it.
     assert 1 <= len(grown) <= 6
-    assert not sim._work.contacts.needed.numpy().any()
+    assert not sim._stepper.work.contacts.needed.numpy().any()

@@ -13,8 +13,8 @@ from warp_contact import (
     SimulationError,
     TetMesh,
     box,
-    simulation,
     sphere,
+    stepper,
 )
 
 G = 9.81
@@ -173,7 +173,7 @@ def test_a_frame_that_blows_up_is_tried_again_with_shorter_steps(monkeypatch):
 
     sim = pull()
     assert np.isfinite(sim.positions()).all() and sim.measure().volume_ratio > 0.0
-    monkeypatch.setattr(simulation, "HALVED", 0)
+    monkeypatch.setattr(stepper, "HALVED", 0)
     with pytest.raises(SimulationError, match=r"body0', vertex \d+ is no longer"):
         pull()
 
@@ -249,20 +249,20 @@ def test_without_memory_for_larger_buffers_the_last_frame_stays(monkeypatch):
     for _ in sim.frames(2):
         pass
     x, measured = sim.positions(), sim.measure()
-    allocate = Simulation._allocate
+    allocate = stepper.Stepper._allocate
 
-    def allocate_no_more(self, state, capacity):
+    def allocate_no_more(self, capacity):
         if capacity.contacts > 10_000:
             raise RuntimeError("no memory")
-        return allocate(self, state, capacity)
+        return allocate(self, capacity)
 
     def outgrow(self, *rates):
-        self.state.x.fill_(1.0)  # a frame that is not finished
-        self._work.contacts.needed.fill_(10_000)
+        self._state.x.fill_(1.0)  # a frame that is not finished
+        self.work.contacts.needed.fill_(10_000)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Simulation, "_allocate", allocate_no_more)
-        patch.setattr(Simulation, "_run", outgrow)
+        patch.setattr(stepper.Stepper, "_allocate", allocate_no_more)
+        patch.setattr(stepper.Stepper, "_run", outgrow)
         with pytest.raises(RuntimeError, match="no memory"):
             sim.step_frame()
     np.testing.assert_array_equal(sim.positions(), x)

@@ -76,7 +76,7 @@ def bound(model, contacts: float) -> float:
 
 def frame_time(sim: wc.Simulation) -> tuple[float, float]:
     """Time of a frame [s], that on the host included, and the part that chooses the step."""
-    times, choice, rates = [], [0.0], sim._spectrum.rates
+    times, choice, rates = [], [0.0], sim._stepper.spectrum.rates
 
     def timed(x: wp.array) -> tuple[float, float]:
         start = perf_counter()
@@ -84,7 +84,7 @@ def frame_time(sim: wc.Simulation) -> tuple[float, float]:
         choice[0] += perf_counter() - start
         return found
 
-    with mock.patch.object(sim._spectrum, "rates", timed):
+    with mock.patch.object(sim._stepper.spectrum, "rates", timed):
         for _ in range(SHOWN_FRAMES):
             start = perf_counter()
             sim.step_frame()

@@ -67,13 +67,13 @@ def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
         for _ in range(ATTEMPTS):
             window = _Window(sim, steps)
             window.stages()
-            needed = sim._work.contacts.needed.numpy().copy()
+            needed = sim._stepper.work.contacts.needed.numpy().copy()
             if not needed.any():
                 break
             window.restore()
-            sim._work.contacts.needed.assign(needed)
-            sim._grow()
-            sim._work.dt.fill_(sim._dt)
+            sim._stepper.work.contacts.needed.assign(needed)
+            sim._stepper.grow()
+            sim._stepper.work.dt.fill_(sim._stepper.dt)
         else:
             raise RuntimeError("contacts outgrow their buffers in every window")
         step, elastic = window.capture(solver.step), window.capture(_elastic)
@@ -102,7 +102,7 @@ def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
         ms={stage: max(0.0, ms[stage]) for stage in found},
         given={stage: given[stage] for stage in found},
         kernels={key: tuple(of) for key, of in kernels.items()},
-        bytes=held(sim.model, sim.state, sim._work),
+        bytes=held(sim.model, sim.state, sim._stepper.work),
     )
 
 
@@ -119,13 +119,13 @@ def _elastic(model, state, work, response, stages, search, unit) -> None:
 class _Window:
     def __init__(self, sim: Simulation, steps: int):
         self._steps = steps
-        self._work, self._device = sim._work, sim.device
-        stages = stages_for(sim._rates[1], sim._dt)
-        sim._work.share.fill_(share_for(sim._rates[1], sim._dt))
-        self._arguments = sim.model, sim.state, sim._work, sim.response, stages
-        self._arguments += sim._search, sim._unit
+        self._work, self._device = sim._stepper.work, sim.device
+        stages = stages_for(sim._stepper.rates[1], sim._stepper.dt)
+        sim._stepper.work.share.fill_(share_for(sim._stepper.rates[1], sim._stepper.dt))
+        self._arguments = sim.model, sim.state, sim._stepper.work, sim.response, stages
+        self._arguments += sim._stepper.search, sim._stepper.unit
         self._work.contacts.needed.zero_()
-        self._start = Snapshot(sim.state, sim._work)
+        self._start = Snapshot(sim.state, sim._stepper.work)
         self.contacts: list[int] = []
         self.operations: list[tuple[str, str]] = []
         self.sizes: list[int] = []

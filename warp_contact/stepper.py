@@ -1,0 +1,228 @@
+"""One frame of a simulation: its steps, and once more where they or their buffers did not do."""
+
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+
+from warp_contact import checkpoint, solver, warm
+from warp_contact.diagnosis import lost_vertex, vertex_name
+from warp_contact.errors import SimulationError
+from warp_contact.forces import share_for, stages_for
+from warp_contact.pace import Pace
+from warp_contact.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.rest import Rest, keep_forces
+from warp_contact.room import enlarged
+from warp_contact.spectrum import Spectrum
+from warp_contact.substeps import raised, stays_damped, stays_stable
+from warp_contact.types import Capacity, Model, State
+from warp_contact.work import Work, allocate_work
+
+NEIGHBOURS = 8  # pairs with a contact force for each body that there is room for at first
+UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
+HALVED = 3  # times that the steps of a frame are halved because its state did not stay finite
+ATTEMPTS = 12  # at a frame, with shorter steps each time
+
+
+class Stepper:
+    """Steps a state frame by frame, in place.
+
+    Attributes:
+        fps: frames per second
+        wanted: steps in a frame that the user chose, or None
+        n: steps of the last frame
+        dt: their length [s], None before the first
+        rates: largest elastic frequency and damping rate at its end [1/s], None before the first
+        search: whether there may be overlaps that no step created; None where nobody has looked
+        work: buffers, with the contacts of the last step
+        rest: who sleeps; None where nobody may
+        spectrum: finds the rates
+        unit: resolution of the recorded contact impulses [N s]
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        state: State,
+        response: ContactSurface | Penalty | PredictedForce,
+        fps: float,
+        wanted: int | None,
+        sleeping: bool,
+    ):
+        """Allocate what the steps need, on the current device."""
+        self.fps, self.wanted = fps, wanted
+        self.n = 0
+        self.dt: float | None = None
+        self.rates: tuple[float, float] | None = None
+        self.search: bool | None = None
+        self._model, self._state, self._response = model, state, response
+        self._pace = Pace(model, response, fps, wanted)
+        self.spectrum = Spectrum(model)
+        # Without weight, what hardly moves need not be held by anything: it flies.
+        sleeping = sleeping and any(model.gravity)
+        self.rest = Rest(model, state, fps) if sleeping else None
+        pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
+        self.work: Work = self._allocate(Capacity(pairs=pairs))
+        self._graphs: dict[tuple[int, bool], wp.Graph] = {}
+        self._saved = State(wp.clone(state.x), wp.clone(state.v))
+        self._saved_warm = warm.allocate(model.n_vert, self.work.capacity.contacts)
+        inv_mass = model.inv_mass.numpy()
+        mobile = float(model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
+        self.unit = UNIT * (mobile if mobile > 0.0 else 1.0)
+
+    def step(self, frame: int) -> None:
+        """Step frame number ``frame``.
+
+        A frame that outgrew its buffers, or whose step turned out too long for the deformation
+        that came, is repeated from its start.
+
+        Raises:
+            SimulationError: no step is stable, or the state does not stay finite; it is then that
+                of the last finished frame
+        """
+        if self.rest and self.search is False:  # an overlap that is left has to be searched
+            if not self.rest.update(self._state, self.work):
+                self.rest.skip_frame(self._state, self.work)
+                return
+        wp.copy(self._saved.x, self._state.x)
+        wp.copy(self._saved.v, self._state.v)
+        warm.copy(self._saved_warm, self.work.warm)
+        while self.search is None or self.grow():
+            self.search = solver.overlaps(self._model, self._state, self.work)
+        omega, rate = self.rates or self.spectrum.rates(self._state.x)
+        self._pace.check(self._state, omega, frame)
+        last, halved = self.n, 0
+        for _ in range(ATTEMPTS):
+            dt = self._run(omega, rate, last, frame)
+            while self.grow():
+                dt = self._run(omega, rate, last, frame)
+            lost = lost_vertex(self._state)
+            if lost is not None:
+                self._go_back()
+                if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
+                    raise SimulationError(
+                        f"frame {frame}: {vertex_name(self._model, lost)} is no longer "
+                        f"finite ({self.n} substeps)"
+                    )
+                halved += 1
+                omega, rate = 2.0 * omega, 2.0 * rate
+                continue
+            after = self.spectrum.rates(self._state.x)
+            stable = self.wanted is not None or stays_stable(dt, after[0], rate)
+            if stable and stays_damped(dt, rate, after[1]):
+                break
+            omega, rate = raised((omega, rate), after)
+            self._go_back()
+        else:
+            raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
+        self.rates = after
+        self.dt = dt
+        self.search = self.search and bool(self.work.deep_found.numpy()[0])
+
+    def use(self, work: Work) -> None:
+        """Go on in other buffers."""
+        self.work = work
+        self._graphs.clear()
+
+    def grow(self) -> bool:
+        """Enlarge the buffers that the frame outgrew, and go back to its start; True if any."""
+        capacity = enlarged(self.work)
+        if capacity is None:
+            return False
+        self._go_back()
+        forces = self.work.impulse, self.work.pair_key, self.work.pair_total
+        self._replace_work(capacity)
+        if self.rest:
+            keep_forces(*forces, self.work)
+        return True
+
+    def values(self) -> dict[str, np.ndarray]:
+        """What a checkpoint needs, beside the state."""
+        values = {"substeps": np.array(self.n)}
+        values |= {f"start.{k}": start for k, start in self.spectrum.starts().items()}
+        values |= {f"warm.{k}": value for k, value in warm.values(self.work.warm).items()}
+        if self.rest:
+            values |= {f"rest.{k}": value for k, value in self.rest.values(self.work).items()}
+        if self.search is not None:
+            values |= {"search": np.array(self.search)}
+        if self.dt is not None:
+            values |= {"dt": np.array(self.dt), "rates": np.array(self.rates)}
+        return values
+
+    def restore(self, values: dict[str, np.ndarray]) -> None:
+        """Take over the ``values`` of another one of the same scene and settings."""
+        self.n = int(values["substeps"])
+        self.spectrum.start_from(checkpoint.part(values, "start"))
+        rest = checkpoint.part(values, "rest")
+        impulses = checkpoint.part(values, "warm")
+        have = self.work.capacity
+        pairs = max(have.pairs, len(rest.get("pair_key", ())))
+        contacts = max(have.contacts, len(impulses["held"]))
+        self._replace_work(replace(have, pairs=pairs, contacts=contacts))
+        warm.restore(self.work.warm, impulses)
+        if self.rest:
+            self.rest.restore(rest, self.work)
+        self.search = bool(values["search"]) if "search" in values else None
+        self.dt = float(values["dt"]) if "dt" in values else None
+        self.rates = tuple(map(float, values["rates"])) if "rates" in values else None
+
+    def _run(self, omega: float, rate: float, last: int, frame: int) -> float:
+        """Step the frame at the rates [1/s] given, after ``last`` steps; return the step [s]."""
+        work = self.work
+        if self.rest:
+            self.rest.begin_frame(self._state, work)
+        else:
+            work.impulse.zero_()
+            work.pair_key.fill_(-1)
+            work.pair_total.zero_()
+        n = self._pace.steps(self._state, omega, last, frame, bool(self.search))
+        dt = 1.0 / (self.fps * n)
+        stages = stages_for(rate, dt)
+        if self.dt is not None and dt != self.dt:
+            work.dt.fill_(0.5 * (self.dt - dt))
+            solver.kick(self._model, self._state, work)  # velocities lag by half a step
+        work.dt.fill_(dt)
+        work.share.fill_(share_for(rate, dt))
+        work.contacts.needed.zero_()
+        work.deep_found.zero_()
+        work.bodies.rebuild()
+        work.steps.fill_(n)
+        wp.capture_launch(self._graph(stages))
+        self.n = n
+        return dt
+
+    def _graph(self, stages: int) -> wp.Graph:
+        """The captured steps of a frame, with so many stages of damping."""
+        key = stages, self.search
+        if key not in self._graphs:
+            arguments = self._model, self._state, self.work, self._response, *key, self.unit
+            with wp.ScopedCapture() as capture:
+                solver.steps(*arguments)
+            self._graphs[key] = capture.graph
+        return self._graphs[key]
+
+    def _allocate(self, capacity: Capacity) -> Work:
+        awake = self.rest.awake if self.rest else None
+        return allocate_work(self._model, self._state, capacity, awake)
+
+    def _replace_work(self, capacity: Capacity) -> None:
+        """Allocate anew; old and new buffers at once would be the peak of the memory."""
+        before = self.work.capacity
+        self._graphs.clear()
+        del self.work
+        try:
+            self.work = self._allocate(capacity)
+            saved = warm.allocate(self._model.n_vert, capacity.contacts)
+        except RuntimeError:  # there is no memory for it
+            self.work = self._allocate(before)
+            warm.copy(self.work.warm, self._saved_warm)
+            raise
+        warm.copy(saved, self._saved_warm)
+        warm.copy(self.work.warm, saved)
+        self._saved_warm = saved
+
+    def _go_back(self) -> None:
+        """Restore the state at the start of the frame."""
+        wp.copy(self._state.x, self._saved.x)
+        wp.copy(self._state.v, self._saved.v)
+        warm.copy(self.work.warm, self._saved_warm)

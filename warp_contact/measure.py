@@ -115,7 +115,7 @@ class Meter:
         energies(model, state.x, energy)
         p = self.mass[:, None] * v
         ratio = topology.signed_volumes(x, self._tets) / self._volume
-        self._follow(state.x)
+        self.follow(state.x)
         overlap, pair, unheld = self.overlap(state.x, work)
         return Measure(
             kinetic=float(0.5 * (p * v).sum() + 0.5 * dt * (self._forces(state.x) * v).sum()),
@@ -208,7 +208,7 @@ class Meter:
         self._deep = wp.zeros(len(ends), dtype=int)
         self._last = x
 
-    def _follow(self, x: wp.array) -> None:
+    def follow(self, x: wp.array) -> None:
         """Count the points that went through something since the last call."""
         model = self.model
         if self._last is None:
@@ -231,6 +231,15 @@ class Meter:
         if len(through):
             own = model.vert_body.numpy()[self._ends.numpy()[through[-1], 0]]
             self._tunnelled_pair = self.names[own], self.names[body[through[-1]]]
+
+    def jump(self, x: wp.array, first: int, last: int) -> None:
+        """Go on from positions ``x`` that no motion led to, of the bodies ``first`` to ``last``."""
+        own = self.model.vert_body.numpy()[self._ends.numpy()[:, 0]]
+        entered, deep = self._entered.numpy(), self._deep.numpy()
+        anew = (first <= own) & (own <= last) | (first <= entered) & (entered <= last)
+        self._entered.assign(np.where(anew, np.int32(-1), entered))
+        self._deep.assign(np.where(anew, np.int32(0), deep))
+        wp.copy(self._last, x)
 
     def _refit(self, x0: wp.array, x: wp.array) -> tuple[wp.Bvh, wp.Bvh, wp.Bvh]:
         """Trees over the ways of bodies and triangles from x0 to x, and over the tets at x."""

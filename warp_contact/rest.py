@@ -75,6 +75,13 @@ class Rest:
         """Let a body's rest begin anew."""
         self._frames[body : body + 1].zero_()
 
+    def wake_all(self, work: Work) -> None:
+        """Let everybody's rest begin anew, awake in the next frame."""
+        self._frames.zero_()
+        self.awake.bodies.fill_(1)
+        self._before = np.ones(self.model.n_body, dtype=np.int32)
+        self._pause(work)
+
     def update(self, state: State, work: Work) -> bool:
         """Before a frame: decide who sleeps. False when nothing is awake."""
         model, awake = self.model, self.awake

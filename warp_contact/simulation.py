@@ -119,6 +119,38 @@ class Simulation:
         """Copy of the velocities [m/s] of one body or of all, shape (n, 3)."""
         return self.state.v.numpy()[self._range(body)].copy()
 
+    def set_positions(self, body: Body | int | None, positions, vertices=None) -> None:
+        """Put vertices elsewhere between frames, as at the start of an episode.
+
+        No motion leads there, so nothing on the way is met or counted, and velocities stay. What
+        overlaps there is moved apart like what overlaps at the start of a run. Everything that
+        sleeps wakes.
+
+        Args:
+            body: the body; None for all
+            positions: shape (k, 3) for k vertices [m]
+            vertices: mask or ids within the body, or among all; None for all of them
+
+        Raises:
+            ValueError: they are not finite, or not of that shape
+        """
+        where = self._range(body)
+        x = self.state.x.numpy().copy()
+        part = x[where]
+        chosen = slice(None) if vertices is None else np.asarray(vertices)
+        of = "positions" if body is None else f"positions of body '{self._label(body)}'"
+        if np.shape(positions) != part[chosen].shape:
+            raise ValueError(f"{of} are {np.shape(positions)}, not {part[chosen].shape}")
+        part[chosen] = positions
+        if not np.isfinite(part).all():
+            raise ValueError(f"{of} are not finite")
+        with wp.ScopedDevice(self.device):
+            self._meter.follow(self.state.x)
+            self.state.x.assign(x)
+            own = self.model.vert_body.numpy()[where]
+            self._meter.jump(self.state.x, own[0], own[-1])
+            self._stepper.look_anew()
+
     def set_velocity(self, body: Body | int, velocity, vertices=None) -> None:
         """Set velocities [m/s] between frames; fixed vertices keep theirs from then on.
 

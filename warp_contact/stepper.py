@@ -119,6 +119,13 @@ class Stepper:
         self.dt = dt
         self.search = self.search and bool(self.work.deep_found.numpy()[0])
 
+    def look_anew(self) -> None:
+        """Before the next frame: positions were set from outside."""
+        self.search = None
+        self.rates = None
+        if self.rest:
+            self.rest.wake_all(self.work)
+
     def use(self, work: Work) -> None:
         """Go on in other buffers."""
         self.work = work

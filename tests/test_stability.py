@@ -4,6 +4,7 @@ import re
 import sys
 from functools import partial
 from pathlib import Path
+from time import perf_counter, sleep
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from stable import (
     speed,
     sweeps,
     tilts,
+    watch,
 )
 from stable.outcome import Record, classify, level
 from stable.setup import METHODS, attempt, response
@@ -200,6 +202,18 @@ def test_a_run_beyond_its_time_is_stopped():
     r = attempt(partial(limits.deep, 0.6), limit=1e-3)
     assert classify(r) == outcome.STOPPED
     assert "not done" in r.reason
+
+
+def test_an_alarm_is_not_lost_in_a_finaliser():
+    class Slow:
+        def __del__(self):
+            end = perf_counter() + 0.02
+            while perf_counter() < end:
+                pass
+
+    with pytest.raises(TimeoutError), watch.alarm(5e-3):
+        Slow()
+        sleep(60.0)
 
 
 def test_the_methods_are_what_they_are_called():

@@ -25,6 +25,7 @@ from stable.outcome import SUNK, Record
 FLOOR = 1e-8
 RUNAWAY = 100.0  # gain of energy after which a run is not followed further
 ACROSS = 0.5  # of the wider body's middle extent: "in front of" is nearer to the line than this
+AGAIN = 0.01  # s after which an alarm that came at a bad moment rings again
 
 
 @dataclass
@@ -178,7 +179,12 @@ def run(setting: Setting, response, most_steps: int = 10**9, limit: float = 120.
 def alarm(seconds: float):
     """Raise TimeoutError in the body after so long: a frame may ask for any number of steps."""
 
-    def ring(*_):
+    def ring(_, frame):
+        while frame:
+            if frame.f_code.co_name == "__del__":  # where an exception would be lost
+                signal.setitimer(signal.ITIMER_REAL, AGAIN)
+                return
+            frame = frame.f_back
         raise TimeoutError
 
     before = signal.signal(signal.SIGALRM, ring)

@@ -5,7 +5,9 @@ Minimum and maximum do not depend on the order of their arguments, so atomics re
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the body's box
 GROW = wp.constant(1.0e-5)  # of an edge: a flat triangle's box must not vanish for a ray

@@ -28,9 +28,10 @@ import warp as wp
 from warp_contact.kernels.bounds import next_in
 from warp_contact.kernels.geometry import boxes_meet
 from warp_contact.kernels.near import MANY, Near, is_near, part, reaches
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.pairs import append
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
 MEAN = wp.constant(0.08)  # of the shortest edge: longer lists cost more than they save

@@ -22,8 +22,9 @@ import warp as wp
 
 from warp_contact.kernels.contact import REST, gap
 from warp_contact.kernels.geometry import NONE, projected_weights
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 STRAY = wp.constant(1.0e-3)  # barycentric weight below which a vertex has left its triangle
 

@@ -9,7 +9,9 @@ over a triangle, and over two edges the same in the basis of their directions.
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 REST = wp.constant(2.0e-4)  # of an edge: the gap that is left between bodies at rest
 

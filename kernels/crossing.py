@@ -8,9 +8,10 @@ import warp as wp
 from warp_contact.kernels.candidates import CAREFUL, gap_to
 from warp_contact.kernels.edge_contact import EdgeContact, edge_contact, is_same
 from warp_contact.kernels.geometry import NONE, projected_crossing, projected_weights
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.vertex_contact import SLIP
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 AHEAD = wp.constant(16.0)  # looks: a distance that lasts so long need not be known any better
 

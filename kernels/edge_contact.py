@@ -26,6 +26,7 @@ import warp as wp
 
 from warp_contact.kernels.geometry import NONE, lines_closest, projected_weights
 from warp_contact.kernels.opposing import edge_looks, opposes
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.surface_query import (
     Crossing,
     Hit,
@@ -40,7 +41,7 @@ from warp_contact.kernels.surface_query import (
 )
 from warp_contact.kernels.vertex_contact import STALE
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 # Of both skins, less the way of both bodies. The impulses seldom use up the rest of it.
 SURE = wp.constant(0.125)

@@ -8,7 +8,9 @@ closest points of two lines                 Ericson 2005, section 5.1.9
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 # Triangles are grown by this fraction for segments: one through the common edge of two triangles
 # must hit at least one of them, and one from a vertex in the skin of stage 1 the face above it.

@@ -12,9 +12,10 @@ import warp as wp
 
 from warp_contact.kernels.geometry import boxes_meet, in_box
 from warp_contact.kernels.near import MANY, Near, any_near, is_near, part, reaches
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.pairs import append
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 
 @wp.func

@@ -15,10 +15,11 @@ from warp_contact.kernels.candidates import LEAST
 from warp_contact.kernels.edge_contact import EdgeContact
 from warp_contact.kernels.geometry import lines_closest, projected_weights
 from warp_contact.kernels.opposing import edge_looks, opposes
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.surface_query import face_normal
 from warp_contact.kernels.tangent import turned
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 LEVEL = wp.constant(0.5)  # cosine by which a contact may turn in a step
 # Of the shortest edge: what is further apart after a step was moved by the user, or has parted. A

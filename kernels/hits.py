@@ -10,8 +10,9 @@ import warp as wp
 
 from warp_contact.kernels.candidates import CAREFUL
 from warp_contact.kernels.geometry import NONE, tet_weights, triangle_closest
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 SKIN = wp.constant(1.0e-3)  # of an edge: a vertex this close is looked at like one inside
 

@@ -28,9 +28,10 @@ import warp as wp
 
 from warp_contact.kernels.contact import REST, gap, gradient
 from warp_contact.kernels.incidence import takes_part, total
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.tangent import allowed, couple_weight, slope
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 TURN = wp.constant(0.1)  # gap times gradient above which a surface cannot take the couple
 STEEP = wp.constant(8.0)  # gradient times edge of a triangle too thin or too tilted for it

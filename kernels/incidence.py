@@ -6,9 +6,10 @@ part of a couple.
 
 import warp as wp
 
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.sorting import sort
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 
 @wp.func

@@ -14,8 +14,9 @@ Source: Parlett 1998, "The symmetric eigenvalue problem".
 import warp as wp
 
 from warp_contact.kernels import motion
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 BREAKDOWN = wp.constant(wp.float64(1.0e-10))  # b^2 / a^2 that is rounding of float32 vectors
 

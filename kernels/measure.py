@@ -8,9 +8,10 @@ import warp as wp
 
 from warp_contact.kernels.bounds import next_in
 from warp_contact.kernels.geometry import tet_weights
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.surface_query import closest_hit, first_crossing, inner_side
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 
 @wp.kernel

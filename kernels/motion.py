@@ -23,7 +23,9 @@ explicit super-time-stepping of parabolic and mixed equations".
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 
 @wp.func

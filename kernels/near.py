@@ -9,8 +9,9 @@ others, such as the floor of a pile, lists none of them: its parts ask the Bvh o
 import warp as wp
 
 from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 MANY = wp.constant(32)  # near bodies that are worth a list
 LARGE = wp.constant(512)  # vertices of a body that is taken by its box

@@ -27,8 +27,11 @@ Source: Smith, de Goes, Kim 2018, "Stable neo-Hookean flesh simulation".
 import warp as wp
 
 from warp_contact.kernels import tet as element
+from warp_contact.kernels.options import ARITHMETIC
 
-wp.set_module_options({"enable_backward": False, "optimization_level": 3})
+wp.set_module_options(ARITHMETIC)
+
+ROW = wp.vec3  # of param
 
 
 SQUASHED = wp.constant(0.25)  # J0
@@ -91,7 +94,7 @@ def energy_density(g: wp.mat33, mu: float, lam: float) -> float:
 def set_forces(
     # in
     tet: wp.array[int],  # (n,) tet ids
-    param: wp.array2d[float],  # (n, 3) mu [Pa], lam [Pa], beta [s]
+    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
     mask: wp.array[int],  # (n_tet,) tets with 0 are skipped
     tets: wp.array[wp.vec4i],  # (n_tet,)
     pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
@@ -106,14 +109,15 @@ def set_forces(
     if mask[q] == 0:
         return
     g = element.displacement_gradient(q, tets, pose, x)
-    element.store_stress(q, -volume[q] * stress(g, param[r, 0], param[r, 1]), pose, f_tet)
+    m = -volume[q] * param[r]  # stresses are linear in the moduli
+    element.store_stress(q, stress(g, m[0], m[1]), pose, f_tet)
 
 
 @wp.kernel
 def apply_stiffness(
     # in
     tet: wp.array[int],  # (n,) tet ids
-    param: wp.array2d[float],  # (n, 3) mu [Pa], lam [Pa], beta [s]
+    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
     tets: wp.array[wp.vec4i],  # (n_tet,)
     pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
     volume: wp.array[float],  # (n_tet,) [m^3]
@@ -127,15 +131,15 @@ def apply_stiffness(
     q = tet[r]
     g = element.displacement_gradient(q, tets, pose, x)
     df = element.rate(q, tets, pose, dx)
-    dp = stress_differential(g, df, param[r, 0], param[r, 1])
-    element.store_stress(q, volume[q] * dp, pose, f_tet)
+    m = volume[q] * param[r]
+    element.store_stress(q, stress_differential(g, df, m[0], m[1]), pose, f_tet)
 
 
 @wp.kernel
 def apply_damping(
     # in
     tet: wp.array[int],  # (n,) tet ids
-    param: wp.array2d[float],  # (n, 3) mu [Pa], lam [Pa], beta [s]
+    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
     tets: wp.array[wp.vec4i],  # (n_tet,)
     pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
     volume: wp.array[float],  # (n_tet,) [m^3]
@@ -149,15 +153,15 @@ def apply_damping(
     q = tet[r]
     f = element.rate(q, tets, pose, x)
     df = element.rate(q, tets, pose, v)
-    p = element.viscous_stress(f, df, param[r, 0], param[r, 1], param[r, 2])
-    element.store_stress(q, volume[q] * p, pose, f_tet)
+    m = volume[q] * param[r][2] * param[r]
+    element.store_stress(q, element.viscous_stress(f, df, m[0], m[1]), pose, f_tet)
 
 
 @wp.kernel
 def energies(
     # in
     tet: wp.array[int],  # (n,) tet ids
-    param: wp.array2d[float],  # (n, 3) mu [Pa], lam [Pa], beta [s]
+    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
     tets: wp.array[wp.vec4i],  # (n_tet,)
     pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
     volume: wp.array[float],  # (n_tet,) [m^3]
@@ -169,4 +173,4 @@ def energies(
     r = wp.tid()
     q = tet[r]
     g = element.displacement_gradient(q, tets, pose, x)
-    energy[q] = volume[q] * energy_density(g, param[r, 0], param[r, 1])
+    energy[q] = volume[q] * energy_density(g, param[r][0], param[r][1])

@@ -8,9 +8,10 @@ velocity, without the turning.
 
 import warp as wp
 
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.tangent import clamped
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 
 @wp.func

@@ -11,9 +11,10 @@ lie in each other's side walls, and must not be pushed out through them.
 import warp as wp
 
 from warp_contact.kernels.geometry import area_vector
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.surface_query import Hit, closer, face_normal
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 LEAN = wp.constant(0.1)  # cosine: looking this much the other way is opposing
 ALONG = wp.constant(0.7)  # cosine: looking this much the same way is looking along

@@ -16,9 +16,10 @@ import warp as wp
 
 from warp_contact.kernels.bounds import GROW, next_in
 from warp_contact.kernels.geometry import GROWN, NONE, triangle_closest
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.surface_query import face_normal
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 OPPOSED = wp.constant(-0.5)  # cosine between two faces that look away from each other
 SKIN = wp.constant(0.1)  # of the thickness of a body

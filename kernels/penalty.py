@@ -8,8 +8,9 @@ Heidelberger et al. 2004, with Coulomb friction as in Keiser et al. 2004 (one_pa
 import warp as wp
 
 from warp_contact.kernels.one_pass import give, relative_velocity
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 
 @wp.kernel

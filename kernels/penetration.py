@@ -21,9 +21,10 @@ import warp as wp
 
 from warp_contact.kernels.hits import hit_range, is_hit
 from warp_contact.kernels.opposing import looks_against
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.surface_query import corner_normals, first_hit, hit_point
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 GRAZING = wp.constant(5.0e-3)  # sine below which a tet edge lies in a wall and does not cross it
 

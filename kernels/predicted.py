@@ -16,8 +16,9 @@ import warp as wp
 
 from warp_contact.kernels.contact import gap
 from warp_contact.kernels.one_pass import give, relative_velocity
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 
 @wp.kernel

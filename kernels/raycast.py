@@ -11,7 +11,9 @@ normals (Hanika 2021, Hacking the shadow terminator), or a coarse mesh shows its
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 FAR = wp.constant(1.0e30)
 GLOW = wp.constant(0.3)  # light from what hides the sky, as a share of that from below [-]

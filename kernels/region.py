@@ -9,7 +9,9 @@ push it the other way, hence the minus sign (as printed the two would cancel):
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 
 @wp.kernel

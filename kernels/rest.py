@@ -11,8 +11,9 @@ which all vertices are fixed hold others, but do not make an island of them.
 import warp as wp
 
 from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 STILL = wp.constant(2.0e-3)  # of an edge: how far a body at rest may move
 FAST = wp.constant(0.02)  # of an edge in a frame: the speed of what is on its way

@@ -9,8 +9,9 @@ import warp as wp
 
 from warp_contact.kernels import tet as element
 from warp_contact.kernels.geometry import NONE
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 
 @wp.kernel

@@ -2,7 +2,9 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 
 @wp.func

@@ -7,8 +7,9 @@ corners of the tet: positions p [m], displacements or velocities u, forces f [N]
 import warp as wp
 
 from warp_contact.kernels import tet as element
+from warp_contact.kernels.options import ARITHMETIC
 
-wp.set_module_options({"enable_backward": False, "optimization_level": 3})
+wp.set_module_options(ARITHMETIC)
 
 mat43 = wp.types.matrix(shape=(4, 3), dtype=float)
 TINY = wp.constant(1.0e-2)  # of the rest size, below which the turning stiffness stops to grow

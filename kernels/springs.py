@@ -24,8 +24,11 @@ geometrically complex deformable solids".
 import warp as wp
 
 from warp_contact.kernels import spring_terms as terms
+from warp_contact.kernels.options import ARITHMETIC
 
-wp.set_module_options({"enable_backward": False, "optimization_level": 3})
+wp.set_module_options(ARITHMETIC)
+
+ROW = float  # param has two dimensions
 
 
 @wp.kernel

@@ -28,8 +28,9 @@ import warp as wp
 
 from warp_contact.kernels.geometry import area_vector
 from warp_contact.kernels.motion import corner_sum
+from warp_contact.kernels.options import OPTIONS
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 FEW = wp.constant(0.05)  # weight of touching vertices that counts as much as the own triangle
 CAUTION = wp.constant(0.25)  # c above; 1 makes neighbours take turns at 0 and 1

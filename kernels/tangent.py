@@ -28,7 +28,9 @@ pushes along n_f. There is no ramp across a gap that is too wide for friction, n
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 UPRIGHT = wp.constant(0.85)  # n . n_f below which a facet is another side of a rim, not a ramp
 LEVEL = wp.constant(1.0e-3)  # slope below which it is none, but rounding

@@ -17,7 +17,9 @@ Source: Sifakis and Barbic 2012 (SIGGRAPH course "FEM simulation of 3D deformabl
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
 
 
 @wp.func
@@ -83,15 +85,17 @@ def dilation(g: wp.mat33, cof_g: wp.mat33) -> float:
 
 
 @wp.func
-def viscous_stress(f: wp.mat33, df: wp.mat33, mu: float, lam: float, beta: float) -> wp.mat33:
-    """First Piola stress F S of S = beta (2 mu Edot + lam tr(Edot) I), Edot = sym(F^T Fdot).
+def viscous_stress(f: wp.mat33, df: wp.mat33, mu: float, lam: float) -> wp.mat33:
+    """First Piola stress F S of S = 2 mu Edot + lam tr(Edot) I, Edot = sym(F^T Fdot).
+
+    Moduli are multiplied by the damping time [Pa s].
 
     Edot vanishes for every rigid motion of the deformed tet, and S : Edot >= 0 as long as
     mu > 0 and 2 mu + 3 lam > 0, that is for every Poisson ratio above -1.
     """
     a = wp.transpose(f) * df
     s = mu * (a + wp.transpose(a)) + lam * wp.trace(a) * wp.identity(n=3, dtype=float)
-    return beta * (f * s)
+    return f * s
 
 
 @wp.func

@@ -20,6 +20,7 @@ import warp as wp
 from warp_contact.kernels.geometry import projected_weights
 from warp_contact.kernels.hits import SKIN
 from warp_contact.kernels.opposing import along, closest_opposing, looks
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.surface_query import (
     Hit,
     closest_hit,
@@ -29,7 +30,7 @@ from warp_contact.kernels.surface_query import (
     leaving_hit,
 )
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 SLIP = wp.constant(1.0)  # change of the weights in a step above which they are taken at its end
 STALE = wp.constant(

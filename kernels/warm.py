@@ -7,9 +7,10 @@ of edges see held.py.
 
 import warp as wp
 
+from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.tangent import turned
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options(OPTIONS)
 
 
 @wp.func

@@ -65,7 +65,7 @@ def _model(*bodies, fixed=(), gravity=(0.0, 0.0, 0.0)) -> SimpleNamespace:
             SimpleNamespace(
                 kernels=material.kernels,
                 tet=wp.array(np.arange(first, first + len(t)), dtype=int),
-                param=wp.array(material.parameters(vertices, t), dtype=float),
+                param=wp.array(material.parameters(vertices, t), dtype=material.kernels.ROW),
                 damped=material.damping > 0.0,
             )
         )

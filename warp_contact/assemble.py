@@ -106,7 +106,7 @@ def _elements(scene: Scene, tet0: np.ndarray) -> tuple[Elements, ...]:
         tet = np.concatenate([np.arange(tet0[b.index], tet0[b.index + 1]) for b in bodies])
         rows = [b.material.parameters(b.mesh.vertices, b.mesh.tets) for b in bodies]
         damped = any(b.material.damping > 0.0 for b in bodies)
-        param = wp.array(np.concatenate(rows), dtype=float)
+        param = wp.array(np.concatenate(rows), dtype=kernels.ROW)
         out.append(Elements(kernels, _ints(tet), param, damped))
     return tuple(out)
 

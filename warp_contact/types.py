@@ -16,7 +16,7 @@ class Elements:
     Attributes:
         kernels: the model's kernel file
         tet: tet ids, shape (n,)
-        param: parameters of each tet in the order of the model's class, shape (n, n_param)
+        param: parameters of each tet in the order of the model's class, shape (n,) of its ``ROW``
         damped: whether any of them has a damping time above zero
     """
 

@@ -68,6 +68,18 @@ def test_what_overlaps_after_a_jump_is_moved_apart_like_at_a_start(rng):
     assert late.energy == pytest.approx(first.energy, rel=0.05, abs=1e-6)
 
 
+def test_a_checkpoint_between_a_jump_and_the_next_frame(rng, tmp_path):
+    sim = run(over_a_plate((0.0, 0.0, -G)), 3)
+    sim.set_positions(1, sim.positions(1) - np.float32([0.0, 0.0, rng.uniform(0.02, 0.1)]))
+    sim.save(tmp_path / "run.npz")
+    other = over_a_plate((0.0, 0.0, -G))
+    other.load(tmp_path / "run.npz")
+    for one in (sim, other):
+        run(one, 2)
+    np.testing.assert_array_equal(sim.positions(), other.positions())
+    np.testing.assert_array_equal(sim.velocities(), other.velocities())
+
+
 def test_a_jump_through_a_plate_is_no_way_through_it(rng):
     sim = over_a_plate()
     sim.measure()

@@ -32,7 +32,7 @@ class Stepper:
         wanted: steps in a frame that the user chose, or None
         n: steps of the last frame
         dt: their length [s], None before the first
-        rates: largest elastic frequency and damping rate at its end [1/s], None before the first
+        rates: largest elastic frequency and damping rate at its end [1/s], None where to be found
         search: whether there may be overlaps that no step created; None where nobody has looked
         work: buffers, with the contacts of the last step
         rest: who sleeps; None where nobody may
@@ -153,7 +153,9 @@ class Stepper:
         if self.search is not None:
             values |= {"search": np.array(self.search)}
         if self.dt is not None:
-            values |= {"dt": np.array(self.dt), "rates": np.array(self.rates)}
+            values |= {"dt": np.array(self.dt)}
+        if self.rates is not None:
+            values |= {"rates": np.array(self.rates)}
         return values
 
     def restore(self, values: dict[str, np.ndarray]) -> None:

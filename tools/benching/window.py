@@ -119,13 +119,14 @@ def _elastic(model, state, work, response, stages, search, unit) -> None:
 class _Window:
     def __init__(self, sim: Simulation, steps: int):
         self._steps = steps
-        self._work, self._device = sim._stepper.work, sim.device
-        stages = stages_for(sim._stepper.rates[1], sim._stepper.dt)
-        sim._stepper.work.share.fill_(share_for(sim._stepper.rates[1], sim._stepper.dt))
-        self._arguments = sim.model, sim.state, sim._stepper.work, sim.response, stages
-        self._arguments += sim._stepper.search, sim._stepper.unit
+        stepper = sim._stepper
+        self._work, self._device = stepper.work, sim.device
+        stages = stages_for(stepper.rates[1], stepper.dt)
+        self._work.share.fill_(share_for(stepper.rates[1], stepper.dt))
+        self._arguments = sim.model, sim.state, self._work, sim.response, stages
+        self._arguments += stepper.search, stepper.unit
         self._work.contacts.needed.zero_()
-        self._start = Snapshot(sim.state, sim._stepper.work)
+        self._start = Snapshot(sim.state, self._work)
         self.contacts: list[int] = []
         self.operations: list[tuple[str, str]] = []
         self.sizes: list[int] = []

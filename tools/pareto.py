@@ -2,8 +2,9 @@
 
     python tools/pareto.py [panel ...] [--quick] [--out DIR] [--python PATH] [--repeats N]
 
-Every method simulates the same vertices, tets, masses and damping at the same frame rate, and is
-judged by its positions alone. Contact detection is inside the time; compiling, loading and the
+Every method simulates the same vertices, tets and masses at the same frame rate, is given the same
+coefficient of damping (what each makes of it stands in ``tools/peers``), and is judged by its
+positions alone. Contact detection is inside the time; compiling, loading and the
 first frame are outside and stand in a column of their own. An engine that is not installed under
 ``--python`` is in the table with that reason. Writes pareto.csv, pareto.png and pareto.txt.
 """
@@ -162,7 +163,7 @@ def head(python: str, repeats: int, seconds: float) -> str:
         f"{platform.system()} {platform.machine()}, {cpu()}, Python {platform.python_version()}, "
         f"Warp {wp.config.version} on {wp.get_device()}; outside: {versions(python)}.",
         "Kernels are compiled and the first frame is stepped before the clock starts. Failures are "
-        "behind everything. Error and time of a method are those of the same run.",
+        "behind everything. Error and time of a method are those of the same setting.",
     ]
     return "\n".join(lines)
 

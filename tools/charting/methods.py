@@ -68,28 +68,30 @@ PEERS = {
 }
 
 
-# The knobs of each engine, then its settings: those of the quick run, and further ones.
-SWEEPS = {
+FEW = 5  # settings of each engine in the quick run
+SWEEPS = {  # the knobs of each engine, then its settings
     "Newton VBD": (
         ("steps", "iterations", "contact", "margin"),
-        ((2, 5, 1, 0.1), (5, 5, 1, 0.1), (10, 10, 1, 0.1), (5, 5, 10, 0.02), (10, 10, 10, 0.02)),
-        ((20, 20, 1, 0.1), (20, 20, 10, 0.02), (40, 20, 10, 0.02), (5, 5, 1, 0.02))
-        + ((20, 20, 100, 0.02),),
+        ((2, 5, 1, 0.1), (5, 5, 1, 0.1), (2, 5, 10, 0.002), (5, 5, 10, 0.02), (5, 5, 10, 0.002))
+        + ((10, 10, 1, 0.1), (10, 10, 10, 0.02), (10, 10, 10, 0.002), (20, 20, 10, 0.002))
+        + ((5, 5, 1, 0.02),),
     ),
     "Newton XPBD": (
-        ("steps", "iterations", "relaxation"),
-        ((5, 2, 0.2), (10, 2, 0.2), (10, 10, 0.2), (32, 2, 0.2), (10, 10, 0.4)),
-        ((32, 10, 0.2), (32, 10, 0.4), (64, 10, 0.2), (128, 4, 0.2), (10, 20, 0.1)),
+        ("steps", "iterations", "relaxation", "radius"),
+        ((5, 10, 0.2, 0.3), (10, 2, 0.2, 0.3), (10, 10, 0.2, 0.3), (5, 10, 0.2, 0.45))
+        + ((10, 10, 0.2, 0.45), (10, 20, 0.1, 0.3), (32, 2, 0.2, 0.3), (32, 10, 0.4, 0.3))
+        + ((10, 2, 0.2, 0.45), (20, 10, 0.1, 0.45)),
     ),
     "MuJoCo flex": (
-        ("steps", "iterations", "time_constant"),
-        ((1, 20, 2), (2, 20, 2), (4, 20, 2), (2, 20, 5), (4, 100, 5)),
-        ((8, 20, 2), (16, 20, 2), (8, 100, 5), (16, 100, 10), (4, 5, 2)),
+        ("steps", "iterations", "time_constant", "radius"),
+        ((1, 20, 2, 0.01), (2, 20, 2, 0.01), (4, 20, 2, 0.01), (2, 20, 2, 1e-4), (4, 20, 2, 1e-4))
+        + ((8, 20, 2, 0.01), (16, 20, 2, 0.01), (8, 20, 2, 1e-4), (16, 20, 2, 1e-4))
+        + ((16, 100, 10, 0.01),),
     ),
 }
 
 
 def outside(method: str, quick: bool) -> list[dict]:
     """Settings of an engine outside: five in the quick run, ten in all."""
-    knobs, first, more = SWEEPS[method]
-    return [dict(zip(knobs, values, strict=True)) for values in (first if quick else first + more)]
+    knobs, rows = SWEEPS[method]
+    return [dict(zip(knobs, row, strict=True)) for row in (rows[:FEW] if quick else rows)]

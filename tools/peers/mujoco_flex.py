@@ -1,16 +1,16 @@
 """MuJoCo's flex bodies: St. Venant-Kirchhoff tets, soft contact by regularised constraints.
 
-Knobs: ``steps`` in a frame, most ``iterations`` of the solver, ``time_constant`` of
-contact over a step (2 is the stiffest that MuJoCo allows). Its friction, gravity, masses and
-stiffness-proportional damping are those of the scene. Held vertices that move ride on a body on
-rails; vertex masses are overwritten with the lumped ones.
+Knobs: ``steps`` in a frame, most ``iterations`` of the solver, ``time_constant`` of contact over a
+step (2 is the stiffest that MuJoCo allows), and the ``radius`` of a vertex over an edge: surfaces
+meet where they are two of them apart. Its friction, gravity, masses and stiffness-proportional
+damping are those of the scene. Held vertices that move ride on a body on rails; vertex masses are
+overwritten with the lumped ones.
 """
 
 import mujoco
 import numpy as np
 from job import CannotDo, main, mean_edge
 
-RADIUS = 0.01  # of a vertex, over an edge
 HEAVY = 1e6  # mass of what is on rails [kg]
 
 
@@ -78,7 +78,7 @@ def xml(scene, job: dict, setting: dict, dt: float) -> str:
         f'solref="{setting["time_constant"] * dt:.9g} 1"/>'
         for *n, h in scene.planes.tolist()
     ]
-    radius = RADIUS * mean_edge(scene)
+    radius = setting["radius"] * mean_edge(scene)
     for k in range(len(scene.young)):
         mine = np.flatnonzero(scene.body == k)
         held = np.flatnonzero(scene.fixed[mine])

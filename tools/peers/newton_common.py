@@ -1,8 +1,7 @@
 """Scenes for the solvers of Newton, and the frame loop, replayed as a captured graph.
 
 Newton's small-strain Lame parameters and its stable neo-Hookean energy are those of this package.
-Its damping sees the rate of F^T F: for a stress 2 beta mu of the strain rate it takes beta mu / 2,
-and it has no part for the volume.
+Both solvers damp tets by one coefficient, each in its own way: see the adapters.
 """
 
 import newton
@@ -20,11 +19,13 @@ def drive(v: wp.array[wp.vec3], dt: float, q: wp.array[wp.vec3]):
     q[i] = q[i] + dt * v[i]
 
 
-def build(scene, stiffness: float, radius: float) -> newton.Model:
+def build(scene, friction: float, damping: float, stiffness: float, radius: float) -> newton.Model:
     """A coloured model with the masses of the scene; a mass of zero holds a particle.
 
     Args:
         scene: arrays of a job
+        friction: of planes [-]; the solvers mix it with that of the particles
+        damping: coefficient of a tet, over beta mu [-]
         stiffness: of contact [N/m]
         radius: of the particles [m]
     """
@@ -43,16 +44,17 @@ def build(scene, stiffness: float, radius: float) -> newton.Model:
             density=float(scene.density[k]),
             k_mu=mu,
             k_lambda=lam,
-            k_damp=0.5 * float(scene.damping[k]) * mu,
+            k_damp=damping * float(scene.damping[k]) * mu,
             particle_radius=radius,
         )
     builder.particle_mass = np.where(scene.fixed, 0.0, scene.mass).tolist()
-    config = newton.ModelBuilder.ShapeConfig(ke=stiffness, kd=0.0, mu=0.0)
+    config = newton.ModelBuilder.ShapeConfig(ke=stiffness, kd=0.0, mu=friction)
     for *n, h in scene.planes.tolist():
         builder.add_shape_plane(plane=(*n, -h), width=0.0, length=0.0, cfg=config)
     builder.color()
     model = builder.finalize(device="cpu")
     model.soft_contact_ke, model.soft_contact_kd = stiffness, 0.0
+    model.soft_contact_mu = model.particle_mu = friction
     return model
 
 

@@ -250,7 +250,7 @@ def crossing_contact(
             if start_gap(face, i, j, x0) > start_gap(contact, i, j, x0):
                 return face
             return contact
-        if hit.tri >= 0 and hit.t > FLAT * edge:
+        if hit.t > FLAT * edge:
             return on_face(p, q, enter.t, leave.t, hit, tris, x)
     elif enter.tri >= 0:
         hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, q)

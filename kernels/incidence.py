@@ -17,7 +17,7 @@ def takes_part(c: int, k: int, vert: wp.array2d[int], coef: wp.array2d[float]) -
     """Whether vertex k of contact c can receive an impulse; unused places repeat a vertex."""
     if coef[c, k] != 0.0:
         return True
-    if k == 0 or vert[c, 2] == vert[c, 0]:
+    if vert[c, 2] == vert[c, 0]:
         return False
     if k == 1 or k == 4:
         return vert[c, k] != vert[c, k - 1]

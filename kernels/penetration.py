@@ -105,7 +105,6 @@ def begin_layer(
 def propagate(
     # in
     threads: int,
-    n_body: int,
     layer: wp.array[int],  # (1,)
     vn_start: wp.array[int],  # (n_vert + 1,)
     vn_vert: wp.array[int],  # (2 n_edge of the tets,)

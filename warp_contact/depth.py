@@ -27,7 +27,7 @@ def hit_depths(model: Model, x: wp.array, work: Work) -> None:
         launch_over(
             penetration.propagate,
             work.capacity.contacts,
-            inputs=[model.n_body, work.layer, model.vn_start, model.vn_vert, x, *hits],
+            inputs=[work.layer, model.vn_start, model.vn_vert, x, *hits],
             outputs=[work.hit_depth, work.hit_dir, work.hit_layer, work.pending],
         )
 

@@ -64,7 +64,7 @@ def find_crossings(
     vert_body: wp.array[int],  # (n_vert,)
     body_edge: wp.array[float],  # (n_body,) [m]
     pace: wp.array[float],  # (n_body,) [m]
-    way: wp.array[float],  # (n_body,) [m]
+    way: wp.array[float],  # (n_body + n_plane,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out

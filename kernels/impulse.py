@@ -57,7 +57,7 @@ def begin_contacts(
     # out
     weight: wp.array[float],  # (capacity,) [1/kg] W
     coupled: wp.array[float],  # (capacity,) [1/kg] W_c
-    closing: wp.array[float],  # (capacity,) [m/s] approach that is allowed, < 0: overlap at x0
+    closing: wp.array[float],  # (capacity,) [m/s] (gap at x0 - gap at rest) / dt
     open: wp.array[float],  # (capacity,) [m] g0, 0 where no surface can take the couple
     turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m] b_k
     mu: wp.array[float],  # (capacity,) coefficient of friction, 0 across a gap that is too wide

@@ -34,7 +34,7 @@ def total_contacts(
     # out
     n_contact: wp.array[int],  # (1,)
     # out, added to
-    needed: wp.array[int],  # largest number seen, to grow the capacity
+    needed: wp.array[int],  # largest number that did not fit
 ):
     """One thread: the number of contacts."""
     n = hits[0] + crossings[0]

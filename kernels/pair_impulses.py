@@ -57,7 +57,7 @@ def add_pair_impulses(
     # in, out
     key: wp.array[wp.int64],  # (n_pair,) lower body * 2^32 + upper body, -1 where free
     total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
-    needed: wp.array[int],  # (1,) pairs that would have been enough
+    needed: wp.array[int],  # (1,) one more than there is room for, where it is short
 ):
     """For each contact: add its impulse to its pair, as integers."""
     for c in range(wp.tid(), n_contact[0], threads):

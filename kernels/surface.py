@@ -19,7 +19,8 @@ neighbours is several times stiffer, so only the part c of an imbalance is corre
 
     literal    P_own = f / A, P_other = sum w_i f_i / (A sum w_i) with f = -F . s^ (eq. 2 as
                printed: A is the same on both sides of the comparison and falls out of it), and
-               a <- a +- 2^-(k + 2), k = 0, 1, ...: bisection after the first half
+               a <- a +- 2^-(k + 2), k = 0, 1, ...: bisection after the first half; P_other with
+               the own triangle blended in as above, pulling forces count as none
 
 A side whose vertices are all fixed is rigid: the other side goes all the way.
 """

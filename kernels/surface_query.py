@@ -1,12 +1,12 @@
 """Questions to the surface of one body, answered through the triangle Bvh from its group's root.
 
     first_hit      the first crossing of a segment that enters (or leaves) the body
-    first_crossing both, from one query
+    first_crossing both
     leaving_hit    where a ray from inside leaves the body
     closest_hit    the closest point of the surface
     corner_normals outward normals of a triangle: of the face, blended over smooth edges only
 
-A hit is (triangle, distance along the query, weights of b and c); triangle -1 means none.
+A hit is (triangle, distance along the query, weights of its corners); triangle -1 means none.
 Normals blended over the rim of a box push sideways and inject energy, so a neighbouring triangle
 joins the blend only when it is within the crease angle.
 """

@@ -80,6 +80,9 @@ def test_a_checkpoint_of_something_else_is_refused(rng, tmp_path):
             other.load(tmp_path / "run.npz")
         assert other.frame == 0
     (tmp_path / "text").write_text("nothing")
+    np.save(tmp_path / "array.npy", np.zeros(3))
+    with pytest.raises(ValueError, match=r"array\.npy is no checkpoint"):
+        sim.load(tmp_path / "array.npy")
     with pytest.raises(ValueError, match="text is no checkpoint"):
         sim.load(tmp_path / "text")
     with pytest.raises(FileNotFoundError):

@@ -12,9 +12,9 @@ SCENES = sorted((ROOT / "scenes").glob("*.py"))
 
 LADDER = (  # a module imports from lower rungs only
     {"kernels"},
-    {"topology", "errors", "progress", "response", "types", "usd_scene", "materials"}
+    {"topology", "errors", "progress", "response", "types", "usd_scene"}
     | {"pictures", "launch", "warm"},
-    {"mesh", "work", "forces", "usd", "checkpoint", "raycast", "diagnosis", "ready"},
+    {"mesh", "materials", "work", "forces", "usd", "checkpoint", "raycast", "diagnosis", "ready"},
     {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"}
     | {"rest", "fields", "placement", "room"},
     {"assemble", "detect", "surface", "render", "scenes", "substeps"},

@@ -28,15 +28,21 @@ def test_a_scene_refuses_what_is_no_physics(options, message):
     [
         ({"fixed": [0, 8]}, "body 'cube': fixed names vertex 8 of 8"),
         ({"fixed": [-1]}, "body 'cube': fixed names vertex -1 of 8"),
-        ({"fixed": np.zeros(7, dtype=bool)}, "the mesh has 8 vertices"),
-        ({"fixed": [0.5]}, "fixed is neither True, nor a mask, nor vertex ids"),
+        ({"fixed": np.zeros(7, dtype=bool)}, r"fixed has shape \(7,\), there are 8"),
+        ({"fixed": [0.5]}, "fixed: neither a mask nor vertex ids"),
         ({"label": "floor"}, "body 'floor': another body has this label"),
+        ({"label": "plane0"}, "body 'plane0': this is how a half-space is called"),
         ({"rotation": (0, 0, 0, 0)}, "body 'cube': rotation is a zero quaternion"),
         ({"position": (0, 0, np.nan)}, "body 'cube': position .* is not finite"),
         ({"velocity": np.zeros((7, 3))}, r"body 'cube': velocity [\s\S]* not of shape"),
         ({"world": -1}, "body 'cube': world -1 is not a count"),
+        ({"world": None}, "body 'cube': "),
         ({"mesh": "bunny"}, "body 'cube': mesh is a str, not a TetMesh"),
         ({"material": NeoHookean(-1.0, 0.3, 1.0)}, "body 'cube': youngs_modulus must be positive"),
+        (
+            {"material": NeoHookean("soft", 0.3, 1.0)},
+            "'cube': youngs_modulus 'soft' is not a number",
+        ),
     ],
 )
 def test_a_body_is_refused_by_its_name(options, message):

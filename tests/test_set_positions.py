@@ -93,6 +93,25 @@ def test_a_jump_through_a_plate_is_no_way_through_it(rng):
     assert sim.measure().tunnelled > 0
 
 
+def test_who_was_inside_a_body_that_jumped_did_not_go_through_it(rng):
+    scene = Scene((0.0, 0.0, 0.0))
+    scene.add_body(box(1.0, 2), SOFT)
+    scene.add_body(box(0.3, 2), SOFT, (*rng.uniform(-0.1, 0.1, 2), 0.7))
+    sim = Simulation(scene)
+
+    def move(by: float) -> int:
+        x = sim.positions()
+        x[sim._range(0)] += np.float32([0.0, 0.0, by])
+        sim.state.x.assign(x)
+        return sim.measure().tunnelled
+
+    sim.measure()
+    assert move(0.15) == 0  # the lower half of the upper block is inside, close to the top
+    jumped = sim.positions(0) + np.float32([0.0, 0.0, 0.8])
+    sim.set_positions(0, jumped)  # now close to the bottom
+    assert move(0.2) == 0
+
+
 def test_what_slept_on_a_body_that_jumped_falls():
     scene = Scene()
     scene.add_plane((0.0, 0.0, 1.0), 0.0)
@@ -119,6 +138,10 @@ def test_what_slept_on_a_body_that_jumped_falls():
         (1, np.zeros((26, 3)), None, r"body 'block' are \(26, 3\), not \(27, 3\)"),
         (1, np.zeros(3), [0], r"body 'block' are \(3,\), not \(1, 3\)"),
         (None, np.zeros((27, 3)), None, r"positions are \(27, 3\), not \(72, 3\)"),
+        (3, np.zeros((27, 3)), None, "no body 3: the scene has 3"),
+        (-1, np.zeros((27, 3)), None, "no body -1: the scene has 3"),
+        (1, np.zeros((1, 3)), [27], "vertices of body 'block' names vertex 27 of 27"),
+        (None, np.zeros((1, 3)), [-1], "vertices of the scene names vertex -1 of 72"),
     ],
 )
 def test_positions_that_are_none_are_refused(body, positions, vertices, message):

@@ -178,6 +178,22 @@ def test_a_frame_that_blows_up_is_tried_again_with_shorter_steps(monkeypatch):
         pull()
 
 
+@pytest.mark.parametrize("times", [1, 4])
+def test_so_is_one_whose_end_has_no_finite_stiffness(monkeypatch, times):
+    sim, other = run(heap(), 1), run(heap(), 2)
+    ends = [(np.inf, np.inf)] * times
+    rates = sim._stepper.spectrum.rates
+    monkeypatch.setattr(sim._stepper.spectrum, "rates", lambda x: ends.pop() if ends else rates(x))
+    if times > stepper.HALVED:
+        with pytest.raises(SimulationError, match=r"frame 2: stiffness .* flattest is body 'bo"):
+            sim.step_frame()
+        assert sim.frame == 1
+        return
+    sim.step_frame()
+    # Twice the rates, to a whole number of steps.
+    assert 2 * other.substeps - 1 <= sim.substeps <= 2 * other.substeps
+
+
 def test_set_velocity_moves_pinned_vertices_and_leaves_them_to_nothing_else():
     scene = Scene(gravity=(0.0, 0.0, -G))
     pinned = np.flatnonzero(box(0.1, 2).vertices[:, 2] > 0.049)
@@ -203,6 +219,14 @@ def test_set_velocity_of_one_body_leaves_the_others(rng):
     np.testing.assert_array_equal(sim.velocities()[others], before[others])
     with pytest.raises(ValueError, match="velocity of body 'body1' is not finite"):
         sim.set_velocity(1, (0.0, np.inf, 0.0))
+    with pytest.raises(
+        ValueError, match=r"velocity of body 'body1' is \(2, 3\), not \(3,\) or \(1"
+    ):
+        sim.set_velocity(1, v[:2], [4])
+    with pytest.raises(ValueError, match="there is no body -1"):
+        sim.set_velocity(-1, v)
+    with pytest.raises(ValueError, match="body 'alien' is of another scene"):
+        sim.set_velocity(Scene().add_body(box(1.0, 1), DRY, label="alien"), v)
 
 
 def test_frames_number_and_time_advance():

@@ -47,7 +47,7 @@ def read(path: str | os.PathLike, scene: str) -> dict[str, np.ndarray]:
     try:
         with np.load(path, allow_pickle=False) as file:
             values = dict(file)
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path} is no checkpoint") from error
     if str(values.pop("scene", "")) != scene:
         what = "another scene, or of other settings or another version of the simulation"

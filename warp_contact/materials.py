@@ -3,7 +3,8 @@
 A model is one kernel file (``warp_contact/kernels/<model>.py``) and one class here with
 
 * ``kernels``: that file; it provides the kernels ``set_forces``, ``apply_stiffness``,
-  ``apply_damping`` and ``energies``, each with one signature for all models;
+  ``apply_damping`` and ``energies``, each with one signature for all models but for ``param``, an
+  array of ``ROW``: the type of a row of parameters, a Warp vector, or ``float`` for two dimensions;
 * ``density`` [kg/m^3] and ``damping`` [s];
 * ``parameters(vertices, tets)``: one row per tet, in the order in which the kernels read it;
 * ``check()``: raises ValueError with a reason.
@@ -11,20 +12,23 @@ A model is one kernel file (``warp_contact/kernels/<model>.py``) and one class h
 
 import math
 from dataclasses import dataclass, fields
+from numbers import Real
 from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
 
 from warp_contact.kernels import corotated, neo_hookean, springs
+from warp_contact.topology import EDGES
 
-EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))  # of a tet, in the order of the kernels
 FACES = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))  # opposite to corners 0, 1, 2, 3
 
 
 def _check_common(material) -> None:
     for field in fields(material):
         value = getattr(material, field.name)
+        if not isinstance(value, Real):
+            raise ValueError(f"{field.name} {value!r} is not a number")
         if not math.isfinite(value):
             raise ValueError(f"{field.name} must be finite, not {value}")
     if material.density <= 0.0:

@@ -236,7 +236,8 @@ class Meter:
         """Go on from positions ``x`` that no motion led to, of the bodies ``first`` to ``last``."""
         own = self.model.vert_body.numpy()[self._ends.numpy()[:, 0]]
         entered, deep = self._entered.numpy(), self._deep.numpy()
-        anew = (first <= own) & (own <= last) | (first <= entered) & (entered <= last)
+        into = np.where(entered < 0, -1, self.model.tri_body.numpy()[entered])
+        anew = (first <= own) & (own <= last) | (first <= into) & (into <= last)
         self._entered.assign(np.where(anew, np.int32(-1), entered))
         self._deep.assign(np.where(anew, np.int32(0), deep))
         wp.copy(self._last, x)

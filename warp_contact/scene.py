@@ -1,10 +1,13 @@
 """A scene: bodies of tets with their materials, half-spaces, gravity and friction."""
 
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from warp_contact.mesh import TetMesh
+
+PLANE = re.compile(r"plane\d+")  # half-spaces in what is measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +47,8 @@ class Scene:
 
     def __init__(self, gravity=(0.0, 0.0, -9.81), friction: float = 0.3):
         """Raises ValueError for a gravity that is not three numbers or a negative friction."""
-        self.gravity = tuple(_numbers(gravity, (3,), "gravity").tolist())
-        self.friction = float(_numbers(friction, (), "friction"))
+        self.gravity = tuple(numbers(gravity, (3,), "gravity").tolist())
+        self.friction = float(numbers(friction, (), "friction"))
         if self.friction < 0.0:
             raise ValueError(f"friction {friction} is negative")
         self.bodies: list[Body] = []
@@ -73,7 +76,7 @@ class Scene:
             velocity: of all vertices, shape (3,), or of each, shape (n, 3) [m/s]
             fixed: True, a mask of shape (n,) or vertex ids: these follow their own velocity
                 whatever pushes them
-            label: name, unique in the scene; by default ``body<index>``
+            label: name, unique in the scene and no ``plane<index>``; by default ``body<index>``
             world: bodies of different worlds never touch
 
         Raises:
@@ -82,18 +85,20 @@ class Scene:
         label = f"body{len(self.bodies)}" if label is None else str(label)
         if label in self._labels:
             raise ValueError(f"body '{label}': another body has this label")
+        if PLANE.fullmatch(label):
+            raise ValueError(f"body '{label}': this is how a half-space is called")
         try:
             if not isinstance(mesh, TetMesh):
                 raise ValueError(f"mesh is a {type(mesh).__name__}, not a TetMesh")
             material.check()
             n = len(mesh.vertices)
             turn = rotation_matrix(rotation)
-            x = mesh.vertices @ turn.T + _numbers(position, (3,), "position")
+            x = mesh.vertices @ turn.T + numbers(position, (3,), "position")
             v = np.broadcast_to(_velocity(velocity, n), (n, 3)).copy()
             mask = _mask(fixed, n)
             if int(world) != world or world < 0:
                 raise ValueError(f"world {world} is not a count")
-        except (ValueError, AttributeError) as error:
+        except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None
         body = Body(len(self.bodies), label, mesh, material, x, v, mask, int(world))
         self.bodies.append(body)
@@ -102,16 +107,16 @@ class Scene:
 
     def add_plane(self, normal, offset: float = 0.0) -> None:
         """Keep every body in the half-space normal . x >= offset [m]."""
-        n = _numbers(normal, (3,), "plane normal")
+        n = numbers(normal, (3,), "plane normal")
         length = float(np.linalg.norm(n))
         if length == 0.0:
             raise ValueError("plane normal is zero")
-        self.planes.append((n / length, float(_numbers(offset, (), "plane offset"))))
+        self.planes.append((n / length, float(numbers(offset, (), "plane offset"))))
 
 
 def rotation_matrix(quaternion) -> np.ndarray:
     """Rotation of a quaternion (x, y, z, w) of any length above zero, shape (3, 3)."""
-    q = _numbers(quaternion, (4,), "rotation")
+    q = numbers(quaternion, (4,), "rotation")
     length = float(np.linalg.norm(q))
     if length == 0.0:
         raise ValueError("rotation is a zero quaternion")
@@ -125,7 +130,7 @@ def rotation_matrix(quaternion) -> np.ndarray:
     )
 
 
-def _numbers(value, shape: tuple, name: str) -> np.ndarray:
+def numbers(value, shape: tuple, name: str) -> np.ndarray:
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -137,7 +142,7 @@ def _numbers(value, shape: tuple, name: str) -> np.ndarray:
 
 def _velocity(velocity, n: int) -> np.ndarray:
     shape = (n, 3) if np.ndim(velocity) == 2 else (3,)
-    return _numbers(velocity, shape, "velocity")
+    return numbers(velocity, shape, "velocity")
 
 
 def _mask(fixed, n: int) -> np.ndarray:
@@ -146,15 +151,21 @@ def _mask(fixed, n: int) -> np.ndarray:
         return mask
     if fixed is True:
         return ~mask
-    fixed = np.asarray(fixed)
-    if fixed.dtype == bool:
-        if fixed.shape != (n,):
-            raise ValueError(f"fixed has shape {fixed.shape}, the mesh has {n} vertices")
-        return fixed.copy()
-    if fixed.size and not np.issubdtype(fixed.dtype, np.integer):
-        raise ValueError("fixed is neither True, nor a mask, nor vertex ids")
-    ids = fixed.astype(np.int64).ravel()
-    if ids.size and (ids.min() < 0 or ids.max() >= n):
-        raise ValueError(f"fixed names vertex {ids[(ids < 0) | (ids >= n)][0]} of {n}")
-    mask[ids] = True
+    mask[vertex_ids(fixed, n, "fixed")] = True
     return mask
+
+
+def vertex_ids(chosen, n: int, name: str) -> np.ndarray:
+    """Ids that a mask of ``n`` vertices, or a list of ids, chooses; ``name`` is for the errors."""
+    chosen = np.asarray(chosen)
+    if chosen.dtype == bool:
+        if chosen.shape != (n,):
+            raise ValueError(f"{name} has shape {chosen.shape}, there are {n} vertices")
+        return np.flatnonzero(chosen)
+    if chosen.size and not np.issubdtype(chosen.dtype, np.integer):
+        raise ValueError(f"{name}: neither a mask nor vertex ids")
+    ids = chosen.astype(np.int64).ravel()
+    wrong = ids[(ids < 0) | (ids >= n)]
+    if wrong.size:
+        raise ValueError(f"{name} names vertex {wrong[0]} of {n}")
+    return ids

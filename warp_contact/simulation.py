@@ -14,7 +14,7 @@ from warp_contact.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.ready import load_kernels
 from warp_contact.response import ContactSurface, Penalty, PredictedForce
-from warp_contact.scene import Body, Scene
+from warp_contact.scene import Body, Scene, vertex_ids
 from warp_contact.stepper import Stepper
 
 
@@ -88,15 +88,13 @@ class Simulation:
             SimulationError: a position or velocity is no longer finite; the state stays that of
                 the last finished frame
         """
-        line = Progress(n) if progress else None
-        for _ in range(n):
-            self.step_frame()
-            if line:
-                measured = self.measure()
-                line.update(self.frame, self.time, measured.n_contacts, measured.overlap)
-            yield self.frame
-        if line:
-            line.close()
+        with Progress(n, quiet=not progress) as line:
+            for _ in range(n):
+                self.step_frame()
+                if progress:
+                    measured = self.measure()
+                    line.update(self.frame, self.time, measured.n_contacts, measured.overlap)
+                yield self.frame
 
     def step_frame(self) -> None:
         """Step one frame.
@@ -132,12 +130,10 @@ class Simulation:
             vertices: mask or ids within the body, or among all; None for all of them
 
         Raises:
-            ValueError: they are not finite, or not of that shape
+            ValueError: there is no such body or vertex, or they are not finite or of that shape
         """
-        where = self._range(body)
         x = self.state.x.numpy().copy()
-        part = x[where]
-        chosen = slice(None) if vertices is None else np.asarray(vertices)
+        where, part, chosen = self._choose(x, body, vertices)
         of = "positions" if body is None else f"positions of body '{self._label(body)}'"
         if np.shape(positions) != part[chosen].shape:
             raise ValueError(f"{of} are {np.shape(positions)}, not {part[chosen].shape}")
@@ -158,17 +154,21 @@ class Simulation:
             body: the body
             velocity: shape (3,), or (k, 3) for k vertices
             vertices: mask or ids within the body; None for all
+
+        Raises:
+            ValueError: there is no such body or vertex, or it is not finite or of that shape
         """
-        where = self._range(body)
         v = self.state.v.numpy().copy()
-        part = v[where]
-        part[slice(None) if vertices is None else np.asarray(vertices)] = velocity
+        _, part, chosen = self._choose(v, body, vertices)
+        of = f"velocity of body '{self._label(body)}'"
+        if np.shape(velocity) not in ((3,), part[chosen].shape):
+            raise ValueError(f"{of} is {np.shape(velocity)}, not (3,) or {part[chosen].shape}")
+        part[chosen] = velocity
         if not np.isfinite(part).all():
-            raise ValueError(f"velocity of body '{self._label(body)}' is not finite")
-        v[where] = part
+            raise ValueError(f"{of} is not finite")
         self.state.v.assign(v)
         if self._stepper.rest:
-            self._stepper.rest.wake(body.index if isinstance(body, Body) else int(body))
+            self._stepper.rest.wake(self._index(body))
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""
@@ -183,8 +183,9 @@ class Simulation:
         """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
 
         The partner is a body's index, n_body + p for plane p, -1 for none; it and the penetration
-        are those of the last step, found at its predicted positions; contacts of edges that go on
-        from the step before have no penetration. Shapes (n_vert,).
+        are those that the last step looked at last: at the positions that it predicted, where it
+        moved surfaces those after that, and without impulses before the forces those at its start.
+        Contacts of edges that go on from the step before have no penetration. Shapes (n_vert,).
         """
         return contact_fields(self.model, self.state.x, self._stepper.work, 1.0 / self.fps)
 
@@ -224,12 +225,29 @@ class Simulation:
     def _range(self, body: Body | int | None) -> slice:
         if body is None:
             return slice(None)
-        index = body.index if isinstance(body, Body) else int(body)
+        index = self._index(body)
         first, last = self.model.body_vert.numpy()[index : index + 2].tolist()
         return slice(first, last)
 
+    def _index(self, body: Body | int) -> int:
+        index = body.index if isinstance(body, Body) else int(body)
+        if not 0 <= index < self.model.n_body:
+            raise ValueError(f"there is no body {index}: the scene has {self.model.n_body}")
+        if isinstance(body, Body) and body.label != self.model.labels[index]:
+            raise ValueError(f"body '{body.label}' is of another scene")
+        return index
+
     def _label(self, body: Body | int) -> str:
-        return self.model.labels[body.index if isinstance(body, Body) else int(body)]
+        return self.model.labels[self._index(body)]
+
+    def _choose(self, values: np.ndarray, body, vertices) -> tuple[slice, np.ndarray, np.ndarray]:
+        """The range of a body, its part of the values and the vertices that are chosen of it."""
+        where = self._range(body)
+        part = values[where]
+        of = "the scene" if body is None else f"body '{self._label(body)}'"
+        name = f"vertices of {of}"
+        chosen = np.arange(len(part)) if vertices is None else vertex_ids(vertices, len(part), name)
+        return where, part, chosen
 
 
 def _device(name: str | None) -> wp.Device:

@@ -1,12 +1,13 @@
 """One frame of a simulation: its steps, and once more where they or their buffers did not do."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import warp as wp
 
 from warp_contact import checkpoint, solver, warm
-from warp_contact.diagnosis import lost_vertex, vertex_name
+from warp_contact.diagnosis import flattest_tet, lost_vertex, vertex_name
 from warp_contact.errors import SimulationError
 from warp_contact.forces import share_for, stages_for
 from warp_contact.pace import Pace
@@ -20,7 +21,8 @@ from warp_contact.work import Work, allocate_work
 
 NEIGHBOURS = 8  # pairs with a contact force for each body that there is room for at first
 UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
-HALVED = 3  # times that the steps of a frame are halved because its state did not stay finite
+HALVED = 3  # times that the steps of a frame are halved because its state, or stiffness, is lost
+NO_RATES = math.inf, math.inf  # of a state that is lost
 ATTEMPTS = 12  # at a frame, with shorter steps each time
 
 
@@ -96,18 +98,14 @@ class Stepper:
             dt = self._run(omega, rate, last, frame)
             while self.grow():
                 dt = self._run(omega, rate, last, frame)
-            lost = lost_vertex(self._state)
-            if lost is not None:
+            after, wrong = self._rates_after()
+            if wrong:
                 self._go_back()
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
-                    raise SimulationError(
-                        f"frame {frame}: {vertex_name(self._model, lost)} is no longer "
-                        f"finite ({self.n} substeps)"
-                    )
+                    raise SimulationError(f"frame {frame}: {wrong} ({self.n} substeps)")
                 halved += 1
                 omega, rate = 2.0 * omega, 2.0 * rate
                 continue
-            after = self.spectrum.rates(self._state.x)
             stable = self.wanted is not None or stays_stable(dt, after[0], rate)
             if stable and stays_damped(dt, rate, after[1]):
                 break
@@ -118,6 +116,17 @@ class Stepper:
         self.rates = after
         self.dt = dt
         self.search = self.search and bool(self.work.deep_found.numpy()[0])
+
+    def _rates_after(self) -> tuple[tuple[float, float], str]:
+        """Rates at the end of a frame [1/s], and what is wrong there: empty where nothing is."""
+        lost = lost_vertex(self._state)
+        if lost is not None:
+            return NO_RATES, f"{vertex_name(self._model, lost)} is no longer finite"
+        after = self.spectrum.rates(self._state.x)
+        if not np.isfinite(after).all():
+            tet = flattest_tet(self._model, self._state.x)
+            return NO_RATES, f"stiffness is no longer finite, the flattest is {tet}"
+        return after, ""
 
     def look_anew(self) -> None:
         """Before the next frame: positions were set from outside."""

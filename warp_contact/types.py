@@ -219,8 +219,8 @@ class Contacts:
 
     Attributes:
         n: number of contacts, shape (1,)
-        needed: capacities that would have been enough, 0 where they were, in the order of
-            ``Capacity``; shape (7,)
+        needed: capacities that would have been enough (of pairs of bodies: one more than there is),
+            0 where they were, in the order of ``Capacity``; shape (7,)
         vert: vertices, shape (capacity, 5)
         coef: signed weights, shape (capacity, 5)
         normal: unit direction, shape (capacity,)
@@ -233,8 +233,8 @@ class Contacts:
         touched: which ones, in any order, shape (n_vert,)
         weight: sum of coef^2 N / m [1/kg], shape (capacity,)
         coupled: the same with what the couple of friction adds [1/kg], shape (capacity,)
-        closing: approach that is allowed [m/s], negative for an overlap at the start of the step,
-            shape (capacity,)
+        closing: approach that is allowed [m/s], negative for less than the resting gap at the start
+            of the step, shape (capacity,)
         open: gap at the start of the step [m], shape (capacity,)
         turn: how couples are handed to the vertices [1/m], shape (capacity, 5)
         lam: normal impulse of the step [N s], shape (capacity,)

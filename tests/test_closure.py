@@ -68,7 +68,7 @@ def test_the_centre_of_mass_stays(rng, stages, find_contacts, records, jittered)
     model, (x0, x1), *_ = closed(scene, stages, find_contacts, records)
     moves = model.mass.numpy()[:, None] * (x1 - x0)
     assert np.abs(moves).max() > 0.0
-    # float32 positions of order 1 m against moves of 5 mm: 1e-5 each, in 32 passes, without order.
+    # float32 positions of order 1 m against moves of 5 mm: 1e-5 each, in many passes.
     assert np.abs(moves.sum(axis=0)).max() < 1e-4 * np.abs(moves).sum()
 
 
@@ -97,7 +97,7 @@ def test_a_deep_overlap_is_resolved_by_a_bounded_part(
     used = c.left > surface.BOUND * edge
     resolved = ((gaps(c, x1) - gaps(c, x0)) / edge)[used]
     assert used.sum() > 10
-    # Everything by the bound at least, but for 5 % that 32 passes leave; what neighbours lift goes
+    # Everything by the bound at least, but for 5 % that the passes leave; what neighbours lift goes
     # further.
     assert resolved.min() > 0.95 * surface.BOUND
     assert np.median(resolved) < 2.0 * surface.BOUND

@@ -51,7 +51,7 @@ def test_impulses_keep_the_momentum(rng, stages, find_contacts, records, jittere
     model, x0, v0, v1, c = exchanged(scene, stages, find_contacts, records)
     linear, angular = momentum_changes(model, x0, v0, v1)
     assert (c.lam > 0.0).sum() > 10
-    # Each of up to 66 sweeps rounds every velocity of up to 5 m/s; heavy ones hardly change.
+    # Each of up to 48 sweeps rounds every velocity of up to 5 m/s; heavy ones hardly change.
     assert linear < 1e-5
     # Overlaps this deep are further than a couple reaches: only without friction.
     assert friction > 0.0 or angular < 1e-5
@@ -88,7 +88,7 @@ def test_impulses_never_add_kinetic_energy(
     mass = model.mass.numpy().astype(float)[:, None]
     assert (c.lam > 0.0).any()
     before, after = ((mass * v * v).sum() for v in (v0, v1))
-    # Rounding of 33 sweeps.
+    # Rounding of up to 48 sweeps.
     assert after <= (1.0 + 1e-5) * before
 
 
@@ -154,8 +154,9 @@ def test_no_contact_approaches_further_than_its_gap(rng, stages, find_contacts, 
     used = c.weight > 0.0
     too_far = -DT * (u + np.maximum(c.closing, 0.0))[used] / model.body_edge.numpy()[0]
     print(f"worst {too_far.max():.1e} of an edge")
-    # The sweeps end at 1e-4 of an edge or after 32 of them.
-    assert np.median(too_far) < 1e-4 and too_far.max() < 2e-2
+    # The sweeps end at their tolerance, or after 48 with some clusters of contacts to go: 3.4e-5 is
+    # the worst of 30 draws.
+    assert np.median(too_far) < impulse.TOLERANCE and too_far.max() < 1e-3
 
 
 def test_fixed_vertices_keep_their_velocity(rng, stages, find_contacts, records, jittered):

@@ -64,8 +64,9 @@ def test_a_scene_has_no_sliver(name, scene):
     assert worst > 0.3
 
 
-@pytest.mark.parametrize("name", scenes.names())
+@pytest.mark.parametrize("name", ["bowl", "membrane_stack", "sampling"])
 def test_a_scene_starts_above_its_planes(name, scene):
+    assert scene.planes
     for normal, offset in scene.planes:
         for body in scene.bodies:
             # float64 rounding of the placement

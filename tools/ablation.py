@@ -60,7 +60,9 @@ class Line:
 
 def main() -> int:
     """Print the table as it comes."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("parts", nargs="*", metavar="part", help=f"of {', '.join(PARTS)}; or all")
     args = parser.parse_args()
     unknown = set(args.parts) - set(PARTS)

@@ -1,6 +1,7 @@
 """Where time and memory go: one figure a line, as ``case.figure value``.
 
-    python tools/bench.py [case ...] [--quick] [--large] [--device NAME] [--out FILE]
+    python tools/bench.py [case ...] [--quick] [--large] [--frames N] [--fraction PART]
+        [--repeats N] [--device NAME] [--kernels] [--out FILE]
 
 Each case runs in a process of its own until there are contacts, then the same few steps again and
 again (a window, begun from the same state each time): as one captured graph, and uncaptured with a
@@ -11,6 +12,7 @@ so that other processes on the machine hardly count; those of frames and starts 
     step.launches              kernels, fills, copies, scans and Bvh refits
     step.ms                    the captured step, as simulations run it
     step.ns_per_vertex         the same for each vertex
+    step.bytes                 sum of STAGE.bytes
     step.elastic_ms            a captured step without contact: damping, predict, drift
     step.operations_ms         sum of all operations, each without what its call costs
     step.overhead_us_per_launch  what the captured step takes beyond that, for each operation
@@ -26,7 +28,9 @@ so that other processes on the machine hardly count; those of frames and starts 
     frames_per_second          of whole frames of 1/60 s, with the choice of the step
     frame.choice_of_step_share    of the time of these frames
     contacts                   at the end of a step
+    window_steps               steps of the window
     array_bytes                in the Warp arrays of model, state and work; without the Bvhs
+    array_bytes_per_vertex     the same over the vertices
     peak_rss_bytes             largest resident size of the process
 
 ``launch_overhead_us`` is the overhead in the 95 vertices of squeezed_sphere, where it matters most.
@@ -55,7 +59,9 @@ OVERHEAD = "squeezed_sphere"
 
 def main() -> int:
     """Run the cases and print their figures as they come."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("cases", nargs="*", metavar="case", help="of those printed; or all")
     parser.add_argument("--quick", action="store_true", help="small cases, few repeats, no compile")
     parser.add_argument(

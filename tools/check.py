@@ -17,7 +17,9 @@ CASES = "collision", "weight", "surface", "scenes", "energy", "bowl"
 
 def main() -> int:
     """Run the cases and print their rows as they come."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("cases", nargs="*", metavar="case", help=f"of {', '.join(CASES)}; or all")
     parser.add_argument("--quick", action="store_true", help="fewer configurations, shorter runs")
     args = parser.parse_args()

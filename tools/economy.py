@@ -1,6 +1,6 @@
 """What contact costs when little of it happens: the same 64 spheres in ever more contact.
 
-    python tools/economy.py [--quick] [--device NAME] [--out FILE]
+    python tools/economy.py [--quick] [--repeats N] [--device NAME] [--out FILE]
 
 The spheres are far apart; or so many pairs of them touch, the others far apart; or each rests on a
 floor by itself; or all have collapsed into a pile on it. The floor is a plane or a mesh. Columns:
@@ -48,7 +48,9 @@ COLUMNS = "vertices", "contacts", "launches", "step", "elastic", *SHORT, "KiB"
 
 def main() -> int:
     """Measure line by line, then print what follows from them."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="one friction, floors not settled")
     parser.add_argument("--repeats", type=count, help="of a window; 5, or 3 with --quick")
     parser.add_argument("--device", help="cpu, cuda:0, ...")

@@ -2,9 +2,9 @@
 
     python tools/pareto.py [panel ...] [--quick] [--out DIR] [--python PATH] [--repeats N]
 
-Every method simulates the same vertices, tets and masses at the same frame rate, is given the same
-coefficient of damping (what each makes of it stands in ``tools/peers``), and is judged by its
-positions alone. Contact detection is inside the time; compiling, loading and the
+Every method simulates the same vertices, tets and masses at the same frame rate on the CPU, is
+given the same coefficient of damping (what each makes of it stands in ``tools/peers``), and is
+judged by its positions alone. Contact detection is inside the time; compiling, loading and the
 first frame are outside and stand in a column of their own. An engine that is not installed under
 ``--python`` is in the table with that reason. Writes pareto.csv, pareto.png and pareto.txt.
 """
@@ -43,7 +43,9 @@ PACKAGES = "newton", "mujoco", "warp-lang"
 
 def main() -> int:
     """Run, draw, write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("panels", nargs="*", metavar="panel", help=f"of {', '.join(PANELS)}")
     parser.add_argument("--quick", action="store_true", help="fewer settings, each once")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "pareto")

@@ -60,7 +60,9 @@ HEAD += f"{'at the end':>10s} {'inverted':>8s}"
 
 def main() -> int:
     """Run, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("scenes", nargs="*", metavar="scene", help=f"of {', '.join(RACES)}")
     parser.add_argument("--quick", action="store_true", help="the fast settings, runs cut short")
     parser.add_argument("--out", type=Path, help="write the table there too")

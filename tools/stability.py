@@ -33,7 +33,9 @@ OUT = Path(__file__).parent / "results" / "stability"
 
 def main() -> int:
     """Run one of the two parts."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parts = parser.add_subparsers(dest="part", required=True)
     part = parts.add_parser("cases", help="small scenes, an outcome and a level each")
     part.add_argument("names", nargs="*", metavar="family", help=f"of {', '.join(FAMILIES)}")

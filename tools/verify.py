@@ -36,7 +36,9 @@ CASES = {
 
 def main() -> int:
     """Run the cases and print their figures as they come."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("cases", nargs="*", metavar="case", help=f"of {', '.join(CASES)}; or all")
     parser.add_argument("--quick", action="store_true", help="fewer variants, coarser meshes")
     parser.add_argument("--response", choices=RESPONSES, default=RESPONSES[0])

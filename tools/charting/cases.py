@@ -122,7 +122,8 @@ def peak(panel: Panel, motion: Motion) -> float:
     """Pressure at the middle against Hertz at the imposed depth.
 
     At rest contact balances the internal forces, so the pressure follows from positions. The held
-    plane above makes the body stiffer, and the mesh costs some 13 %: methods meet at this floor.
+    plane above makes the body stiffer, and the mesh has its error too: whoever comes to rest on it
+    meets at that floor, not at zero.
     """
     parts.sound(panel, motion)
     scene = panel.scene()

@@ -88,7 +88,6 @@ def pair(
     v=0.5,
     gravity=DOWN,
     fixed=None,
-    recovers=False,
 ) -> Setting:
     """A cube comes down on one that is held; lengths, speed and time scale together."""
     g = np.array(gravity) * (1.0 if scale == 1.0 else 1.0 / scale)
@@ -102,11 +101,8 @@ def pair(
     scene.add_body(high, material, place, velocity=(0.0, 0.0, -v), fixed=fixed, label="high")
     if fixed:
         scene.bodies[1].v[:] = 0.0
-    pairs = () if recovers else ((0, 1, UP),)
     period = 2.0 * EDGE * np.sqrt(density / young) if young > 0.0 and density > 0.0 else 1.0
-    return Setting(
-        scene, 8.0 * scale * period, 5.0 / (scale * period), pairs=pairs, recovers=recovers
-    )
+    return Setting(scene, 8.0 * scale * period, 5.0 / (scale * period), pairs=((0, 1, UP),))
 
 
 def on_tip(aside: float, along: float, cells: int = 1) -> Setting:

@@ -146,7 +146,7 @@ class Watch:
         return ""
 
 
-def run(setting: Setting, response, most_steps: int = 10**9, limit: float = 120.0) -> Record:
+def run(setting: Setting, response, most_steps: int = 10**9, limit: float = 1e6) -> Record:
     """Run a setting to its end, to its first failure for good, or for so many steps or seconds."""
     try:
         sim = wc.Simulation(setting.scene, response, setting.fps, setting.substeps)

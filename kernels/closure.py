@@ -43,7 +43,7 @@ def leftover(
     offset: wp.array[float],  # (capacity,) [m]
     pair: wp.array[wp.vec2i],  # (capacity,)
     body_edge: wp.array[float],  # (n_body,) [m]
-    closing: wp.array[float],  # (capacity,) [m/s] gap at its start above that at rest
+    closing: wp.array[float],  # (capacity,) [m/s] (gap at x0 - gap at rest) / dt
     dt: wp.array[float],  # (1,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
@@ -89,7 +89,7 @@ def begin_closure(
     n_contact: wp.array[int],  # (1,)
     pair: wp.array[wp.vec2i],  # (capacity,)
     body_edge: wp.array[float],  # (n_body,) [m]
-    closing: wp.array[float],  # (capacity,) [m/s] gap at its start above that at rest
+    closing: wp.array[float],  # (capacity,) [m/s] (gap at x0 - gap at rest) / dt
     dt: wp.array[float],  # (1,) [s]
     left: wp.array[float],  # (capacity,) [m]
     # out

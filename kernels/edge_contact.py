@@ -43,8 +43,8 @@ from warp_contact.kernels.vertex_contact import STALE
 
 wp.set_module_options(OPTIONS)
 
-# Of both skins: what is closer than this is among the candidates. Less is sure only where a list is
-# about to be found anew and an edge is deeper than a fiftieth of one.
+# Of both skins: what is closer is taken to be among the candidates. Not sure where a list is about
+# to be found anew, for edges deeper than 0.02 of their length.
 SURE = wp.constant(0.125)
 SHARP = wp.constant(1.64)  # a ridge with a dihedral angle below 75 degrees is sharp
 TURNED = wp.constant(0.95)  # cosine: of two edges that are almost parallel, n turns in a step

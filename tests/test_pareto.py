@@ -44,6 +44,23 @@ def test_the_impulses_alone_move_no_surface(monkeypatch):
     assert calls != []
 
 
+def test_held_vertices_stop_where_the_panel_says_so():
+    from charting import methods, ours
+
+    blocks = panel()
+
+    def build():
+        scene = blocks.scene()
+        scene.bodies[1].fixed[:] = True
+        return scene
+
+    setting = next(s for s in methods.own(quick=True) if s.method == "default")
+    motion = ours.run(replace(blocks, scene=build, frames=3, stop=1), setting, None, 60.0)
+    z = motion.x[:, 8:, 2].mean(axis=1)
+    assert z[0] - z[1] == pytest.approx(0.5 / 240, rel=1e-4)  # float32 positions of 0.1 m
+    np.testing.assert_array_equal(z[1:], z[1])
+
+
 def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
     import pareto
     from charting import methods

@@ -58,3 +58,15 @@ def test_every_scene_of_the_race_can_be_built():
         assert len(build().bodies) > 1
         assert seconds > 0.0
         assert all(len(values) >= settings > 0 for values in race.SETTINGS.values())
+
+
+def test_every_setting_has_a_value_for_each_knob():
+    import race
+    from charting import methods
+
+    for engine, rows in race.SETTINGS.items():
+        assert all(len(row) == len(methods.SWEEPS[engine][0]) for row in rows)
+    for engine in methods.PEERS:
+        quick, full = (methods.outside(engine, q) for q in (True, False))
+        assert quick == full[: methods.FEW] and len(full) == 10
+        assert len({tuple(setting.values()) for setting in full}) == 10

@@ -36,7 +36,7 @@ def test_a_scene_refuses_what_is_no_physics(options, message):
         ({"position": (0, 0, np.nan)}, "body 'cube': position .* is not finite"),
         ({"velocity": np.zeros((7, 3))}, r"body 'cube': velocity [\s\S]* not of shape"),
         ({"world": -1}, "body 'cube': world -1 is not a count"),
-        ({"world": None}, "body 'cube': "),
+        ({"world": None}, "body 'cube': world None is not a count"),
         ({"mesh": "bunny"}, "body 'cube': mesh is a str, not a TetMesh"),
         ({"material": NeoHookean(-1.0, 0.3, 1.0)}, "body 'cube': youngs_modulus must be positive"),
         (

@@ -163,7 +163,7 @@ def head(python: str, repeats: int, seconds: float) -> str:
     lines = [
         f"Error against wall time, {today}, {repeats} run(s) of each, {seconds:.0f} s in all.",
         f"{platform.system()} {platform.machine()}, {cpu()}, Python {platform.python_version()}, "
-        f"Warp {wp.config.version} on {wp.get_device()}; outside: {versions(python)}.",
+        f"Warp {wp.config.version} on cpu; outside: {versions(python)}.",
         "Kernels are compiled and the first frame is stepped before the clock starts. Failures are "
         "behind everything. Error and time of a method are those of the same setting.",
     ]

@@ -32,7 +32,7 @@ FPS = 60
 LIMIT, QUICK_LIMIT = 400.0, 20.0  # wall seconds of one run
 SETTINGS = {  # of each engine outside: fast, plain
     "Newton VBD": ((5, 5, 1, 0.1), (10, 10, 1, 0.1)),
-    "Newton XPBD": ((10, 2, 0.2, 0.3), (10, 10, 0.2, 0.45)),
+    "Newton XPBD": ((10, 2, 0.2, 0.43), (10, 10, 0.2, 0.43)),
     "MuJoCo flex": ((4, 20, 2, 0.01), (8, 20, 2, 0.01)),
 }
 

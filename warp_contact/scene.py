@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, field
+from numbers import Integral
 
 import numpy as np
 
@@ -96,7 +97,7 @@ class Scene:
             x = mesh.vertices @ turn.T + numbers(position, (3,), "position")
             v = np.broadcast_to(_velocity(velocity, n), (n, 3)).copy()
             mask = _mask(fixed, n)
-            if int(world) != world or world < 0:
+            if not isinstance(world, Integral) or world < 0:
                 raise ValueError(f"world {world} is not a count")
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None

@@ -85,8 +85,8 @@ class Simulation:
         """Step ``n`` frames and yield the number of each when it is finished.
 
         Raises:
-            SimulationError: a position or velocity is no longer finite; the state stays that of
-                the last finished frame
+            SimulationError: a position, velocity or stiffness is no longer finite, or no step is
+                stable; the state stays that of the last finished frame
         """
         with Progress(n, quiet=not progress) as line:
             for _ in range(n):
@@ -233,7 +233,7 @@ class Simulation:
         index = body.index if isinstance(body, Body) else int(body)
         if not 0 <= index < self.model.n_body:
             raise ValueError(f"there is no body {index}: the scene has {self.model.n_body}")
-        if isinstance(body, Body) and body.label != self.model.labels[index]:
+        if isinstance(body, Body) and body is not self.scene.bodies[index]:
             raise ValueError(f"body '{body.label}' is of another scene")
         return index
 

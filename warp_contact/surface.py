@@ -13,7 +13,7 @@ from warp_contact.types import Contacts, Model
 from warp_contact.work import Work
 
 TOLERANCE = 1e-4  # of an edge: less overlap is left to the resting gap of the impulses
-DEEP = 1e-3  # of an edge below the resting gap: an overlap at its start that is worth a search
+DEEP = 1e-3  # of an edge below the resting gap: an overlap at the start of a step, worth a search
 BOUND = 0.02  # of an edge: the largest move in a step; more would invert a body started deep inside
 PASSES = 128  # of the closure, at most; corners that meet need more than 32
 

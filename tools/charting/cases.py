@@ -2,7 +2,8 @@
 
 Every body is neo-Hookean, so that the engines that know no other law simulate the same. What is
 held moves in from outside, because most engines cannot start from bodies inside each other. The
-material damps stiffness-proportionally, the same for all, where the state of rest is asked for.
+material damps stiffness-proportionally where the state of rest is asked for, with the same
+coefficient for all.
 """
 
 from functools import cache

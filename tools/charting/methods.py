@@ -60,8 +60,7 @@ def own(quick: bool) -> list[Own]:
     return out + [Own("penalty", times=k, factor=2) for k in STIFFNESSES]
 
 
-# Knobs of the engines outside: file in tools/peers, then settings as the file reads them.
-PEERS = {
+PEERS = {  # the engines outside: their files in tools/peers
     "Newton VBD": "newton_vbd.py",
     "Newton XPBD": "newton_xpbd.py",
     "MuJoCo flex": "mujoco_flex.py",
@@ -78,9 +77,9 @@ SWEEPS = {  # the knobs of each engine, then its settings
     ),
     "Newton XPBD": (
         ("steps", "iterations", "relaxation", "radius"),
-        ((5, 10, 0.2, 0.3), (10, 2, 0.2, 0.3), (10, 10, 0.2, 0.3), (5, 10, 0.2, 0.45))
-        + ((10, 10, 0.2, 0.45), (10, 20, 0.1, 0.3), (32, 2, 0.2, 0.3), (32, 10, 0.4, 0.3))
-        + ((10, 2, 0.2, 0.45), (20, 10, 0.1, 0.45)),
+        ((5, 10, 0.2, 0.3), (10, 2, 0.2, 0.3), (10, 10, 0.2, 0.3), (5, 10, 0.2, 0.43))
+        + ((10, 10, 0.2, 0.43), (10, 20, 0.1, 0.3), (32, 2, 0.2, 0.3), (32, 10, 0.4, 0.3))
+        + ((10, 2, 0.2, 0.43), (20, 10, 0.1, 0.43)),
     ),
     "MuJoCo flex": (
         ("steps", "iterations", "time_constant", "radius"),

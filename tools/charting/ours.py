@@ -62,4 +62,4 @@ def play(panel: Panel, response, substeps: int | None, limit: float) -> Motion:
 def _halt(sim: wc.Simulation) -> None:
     for body in sim.scene.bodies:
         if body.fixed.any():
-            sim.set_velocity(body, 0.0, body.fixed)
+            sim.set_velocity(body, (0.0, 0.0, 0.0), body.fixed)

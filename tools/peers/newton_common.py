@@ -24,7 +24,7 @@ def build(scene, friction: float, damping: float, stiffness: float, radius: floa
 
     Args:
         scene: arrays of a job
-        friction: of planes [-]; the solvers mix it with that of the particles
+        friction: of planes and particles [-]; the solvers mix both
         damping: coefficient of a tet, over beta mu [-]
         stiffness: of contact [N/m]
         radius: of the particles [m]

@@ -1,11 +1,12 @@
 """Newton's extended position-based dynamics: constraints of tets, relaxed all at once.
 
 Knobs: ``steps`` in a frame, ``iterations``, ``relaxation`` and ``radius``. Between soft bodies its
-contact knows particles only: balls about the vertices, of a radius over a mean edge; from 0.5 on
-two of one body touch at rest. Its damping of a constraint is the coefficient over the modulus: that
-of the shape is beta as in the scene, that of the volume beta mu / lambda. Its constraints
-tr(F^T F) - 3 and det F - 1 both see no more than the change of volume at small strains; forces are
-read as those of the law that the scene asks for.
+contact knows particles only: balls about the vertices, of a radius over a mean edge of the finest
+body. Two of one body that are closer than two radii push each other apart at rest, too: in cells of
+``box`` from 0.44 on, in sheets one layer thick always. Its damping of a constraint is the
+coefficient over the modulus: that of the shape is beta as in the scene, that of the volume
+beta mu / lambda. Its constraints tr(F^T F) - 3 and det F - 1 both see no more than the change of
+volume at small strains; forces are read as those of the law that the scene asks for.
 """
 
 import newton

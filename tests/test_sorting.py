@@ -57,3 +57,18 @@ def test_pairs_do_not_depend_on_the_order_in_which_items_were_found(rng, device)
         for (i, body), (first, end) in zip(expected, items.numpy().tolist(), strict=False):
             held = [k for owner, k in owned if owner == i and item_body[k] == body]
             assert item.numpy()[first:end].tolist() == sorted(held)
+
+
+def test_a_vertex_of_weight_zero_takes_part_and_a_repeated_one_does_not(device):
+    vert = np.array([[0, 0, 1, 2, 3], [4, 4, 4, 4, 4], [0, 1, 2, 3, 3]])
+    coef = np.float32([[1, 0, -0.5, -0.5, 0], [1, 0, 0, 0, 0], [0, 1, -0.3, -0.7, 0]])
+    taking = {(0, 0), (0, 2), (0, 3), (0, 4), (1, 0), (2, 0), (2, 1), (2, 2), (2, 3)}
+    n, rows = wp.array([3], dtype=int), [wp.array(vert, dtype=int), wp.array(coef)]
+    count, n_touched = wp.zeros(6, dtype=int), wp.zeros(1, dtype=int)
+    wp.launch(incidence.count_entries, dim=2, inputs=[2, n, *rows], outputs=[n_touched, count])
+    expected = np.bincount([vert[place] for place in taking], minlength=6)
+    np.testing.assert_array_equal(count.numpy(), expected)
+    start = wp.array(np.cumsum(expected), dtype=int)
+    entry = wp.full(15, -1, dtype=int)
+    wp.launch(incidence.fill_entries, dim=2, inputs=[2, n, *rows], outputs=[start, entry])
+    assert {divmod(e, 5) for e in entry.numpy()[: len(taking)].tolist()} == taking

@@ -3,9 +3,8 @@
 Knobs: ``steps`` in a frame, ``iterations``, ``contact`` stiffness over E edge, and the ``margin``
 over an edge at which contact begins. Its contact knows triangles and edges, and takes all bodies
 as one mesh. It is looked for within two margins; between two looks no vertex moves further than
-0.85 margins. (Looks that reach further let thin margins come closer to series springs, 0.17 % for
-0.31, but squeezed bodies spring out.) Its damping sees the rate of F^T F: for a stress 2 beta mu of
-the strain rate it takes beta mu / 2, and it has no part for the volume.
+0.85 margins. Its damping sees the rate of F^T F: for a stress 2 beta mu of the strain rate it takes
+beta mu / 2, and it has no part for the volume.
 """
 
 import newton

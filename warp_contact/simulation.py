@@ -133,7 +133,7 @@ class Simulation:
             ValueError: there is no such body or vertex, or they are not finite or of that shape
         """
         x = self.state.x.numpy().copy()
-        where, part, chosen = self._choose(x, body, vertices)
+        part, chosen = self._choose(x, body, vertices)
         of = "positions" if body is None else f"positions of body '{self._label(body)}'"
         if np.shape(positions) != part[chosen].shape:
             raise ValueError(f"{of} are {np.shape(positions)}, not {part[chosen].shape}")
@@ -143,7 +143,7 @@ class Simulation:
         with wp.ScopedDevice(self.device):
             self._meter.follow(self.state.x)
             self.state.x.assign(x)
-            own = self.model.vert_body.numpy()[where]
+            own = self.model.vert_body.numpy()[self._range(body)]
             self._meter.jump(self.state.x, own[0], own[-1])
             self._stepper.look_anew()
 
@@ -159,7 +159,7 @@ class Simulation:
             ValueError: there is no such body or vertex, or it is not finite or of that shape
         """
         v = self.state.v.numpy().copy()
-        _, part, chosen = self._choose(v, body, vertices)
+        part, chosen = self._choose(v, body, vertices)
         of = f"velocity of body '{self._label(body)}'"
         if np.shape(velocity) not in ((3,), part[chosen].shape):
             raise ValueError(f"{of} is {np.shape(velocity)}, not (3,) or {part[chosen].shape}")
@@ -240,14 +240,13 @@ class Simulation:
     def _label(self, body: Body | int) -> str:
         return self.model.labels[self._index(body)]
 
-    def _choose(self, values: np.ndarray, body, vertices) -> tuple[slice, np.ndarray, np.ndarray]:
-        """The range of a body, its part of the values and the vertices that are chosen of it."""
-        where = self._range(body)
-        part = values[where]
+    def _choose(self, values: np.ndarray, body, vertices) -> tuple[np.ndarray, np.ndarray]:
+        """A body's part of the values, as a view, and the vertices that are chosen of it."""
+        part = values[self._range(body)]
         of = "the scene" if body is None else f"body '{self._label(body)}'"
         name = f"vertices of {of}"
         chosen = np.arange(len(part)) if vertices is None else vertex_ids(vertices, len(part), name)
-        return where, part, chosen
+        return part, chosen
 
 
 def _device(name: str | None) -> wp.Device:

@@ -1,4 +1,4 @@
-"""How much the tets of a body have changed their shape; rigid motion changes none.
+"""How much tets have changed their shape, and whether one is flat; rigid motion changes nothing.
 
     G = D E,  change = largest |entry| of G^T G - 1        D edges of the tet now, E inverse before
 
@@ -48,3 +48,19 @@ def changes(
     if not wp.ddot(s, s) < NONE or wp.determinant(before[q]) == 0.0:
         most = NONE
     wp.atomic_max(change, vert_body[tets[q][0]], most)
+
+
+@wp.kernel
+def squashed(
+    # in
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    least: float,  # volume, of that at rest
+    # in, out
+    any: wp.array[int],  # (1,) set to 1 where a tet has less
+):
+    """One thread per tet."""
+    q = wp.tid()
+    if wp.determinant(element.rate(q, tets, pose, x)) < least:
+        any[0] = 1

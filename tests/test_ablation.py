@@ -8,7 +8,7 @@ from unittest import mock
 import pytest
 import warp as wp
 
-from warp_contact import candidates, depth, impulse, solver, substeps, surface
+from warp_contact import candidates, depth, impulse, solver, stepper, substeps, surface
 from warp_contact.kernels import edge_contact, vertex_contact
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
@@ -17,7 +17,17 @@ import ablation
 from ablating.off import without
 from ablating.parts import PARTS, Part
 
-OWNERS = candidates, depth, impulse, solver, substeps, surface, edge_contact, vertex_contact
+OWNERS = (
+    candidates,
+    depth,
+    impulse,
+    solver,
+    stepper,
+    substeps,
+    surface,
+    edge_contact,
+    vertex_contact,
+)
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from warp_contact import (
     box,
     sphere,
     stepper,
+    substeps,
 )
 
 G = 9.81
@@ -194,6 +195,48 @@ def test_so_is_one_whose_end_has_no_finite_stiffness(monkeypatch, times):
     assert 2 * other.substeps - 1 <= sim.substeps <= 2 * other.substeps
 
 
+def one_frame(monkeypatch, size: float, part: int, second=lambda found: found):
+    """A free block let go at ``size`` of its lengths, looked at every ``part`` steps of a frame.
+
+    Returns it after the frame, and what the looks found, the second of them through ``second``.
+    """
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    mesh = box(0.1, 2)
+    scene.add_body(mesh, DRY)
+    sim = Simulation(scene, fps=200)
+    sim.set_positions(0, size * mesh.vertices)
+    rates, found = sim._stepper.spectrum.rates, []
+
+    def look(x):
+        found.append(rates(x))
+        return second(found[-1]) if len(found) == 2 else found[-1]
+
+    monkeypatch.setattr(sim._stepper.spectrum, "rates", look)
+    monkeypatch.setattr(stepper, "PART", part)
+    sim.step_frame()
+    return sim, found
+
+
+def test_looks_within_a_frame_change_nothing_where_its_steps_do(monkeypatch):
+    often, looks = one_frame(monkeypatch, 0.5, 3)
+    once, two = one_frame(monkeypatch, 0.5, 1000)
+    assert len(looks) > len(two) == 2  # the start and the end
+    assert often.substeps == once.substeps
+    np.testing.assert_array_equal(often.positions(), once.positions())
+    np.testing.assert_array_equal(often.velocities(), once.velocities())
+
+
+def test_where_no_tet_is_flat_there_are_none(monkeypatch):
+    assert len(one_frame(monkeypatch, 0.7, 3)[1]) == 2
+
+
+def test_a_step_that_is_too_long_within_a_frame_repeats_it(monkeypatch):
+    usual = one_frame(monkeypatch, 0.5, 3)[0].substeps
+    stiffer = one_frame(monkeypatch, 0.5, 3, lambda found: (1e9, found[1]))[0].substeps
+    most = substeps.RAISED[1]
+    assert most * (usual - 1) < stiffer <= most * usual
+
+
 def test_set_velocity_moves_pinned_vertices_and_leaves_them_to_nothing_else():
     scene = Scene(gravity=(0.0, 0.0, -G))
     pinned = np.flatnonzero(box(0.1, 2).vertices[:, 2] > 0.049)
@@ -283,6 +326,7 @@ def test_without_memory_for_larger_buffers_the_last_frame_stays(monkeypatch):
     def outgrow(self, *rates):
         self._state.x.fill_(1.0)  # a frame that is not finished
         self.work.contacts.needed.fill_(10_000)
+        return 1.0, None
 
     with monkeypatch.context() as patch:
         patch.setattr(stepper.Stepper, "_allocate", allocate_no_more)

@@ -199,6 +199,18 @@ def test_a_sliver_that_is_flattened_is_seen(build_model):
     assert spectrum.rates(y)[0] == pytest.approx(Spectrum(model).omega(y), rel=CLOSE)
 
 
+@pytest.mark.parametrize("volume", [-0.5, 0.0, 0.249, 0.251, 3.0])
+def test_rates_may_rise_where_tets_are_flat_however_they_lie(volume, blob, build_model, rng):
+    x, tets = blob((2, 2, 2))
+    model = build_model((x, tets, MATERIALS[0]))
+    spectrum = Spectrum(model)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    y = (x @ turn.T) @ np.diag([1.0, 2.0, volume / 2.0]) + [3.0, 0.0, 0.0]
+    assert not spectrum.rises(wp.array(x, dtype=wp.vec3))
+    assert spectrum.rises(wp.array(y, dtype=wp.vec3)) == (volume < 0.25)
+
+
 def test_rates_without_bound_are_not_kept(blob, build_model):
     x, tets = blob((2, 1, 1))
     spectrum = Spectrum(build_model((x, tets, MATERIALS[0])))

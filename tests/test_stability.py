@@ -17,6 +17,7 @@ from stable import (
     limits,
     outcome,
     primitives,
+    ratios,
     speed,
     sweeps,
     tilts,
@@ -41,6 +42,7 @@ CASES = {
     "tet in a slot": partial(primitives.slot, 5e-7),
     "faces at distance zero": degenerate.pair,
     "three cubes on a membrane": partial(figures.membrane, 0.2),
+    "cube of 10^4 times the mass on a small one": partial(ratios.heavy, 0.5),
 }
 
 
@@ -68,6 +70,14 @@ def test_a_case_that_is_excellent_stays_so(name):
 def test_a_corner_that_slides_up_a_bent_face_gains_next_to_nothing():
     # 17 % where facets that lean push along the direction of stage 2; chance decides below 1 %.
     assert level(attempt(partial(tilts.collide, 47))) in (outcome.GOOD, outcome.EXCELLENT)
+
+
+def test_a_cube_is_crushed_to_a_tenth_and_comes_back():
+    # 30 % of the energy more, and tets inside out, where steps are looked at between frames only.
+    r = attempt(partial(ratios.heavy, 0.2, 2.0))
+    print(r)
+    assert level(r) in (outcome.GOOD, outcome.EXCELLENT)
+    assert r.lowest < 0.1 < r.volume
 
 
 @pytest.mark.parametrize("case", list(degenerate.refusals()), ids=lambda case: case.name)

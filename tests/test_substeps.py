@@ -62,6 +62,13 @@ def test_a_step_is_refused_before_it_is_unstable(z, least):
     assert not stable(1e-3, math.inf) and not stable(1e-3, math.nan)
 
 
+def test_a_frame_is_repeated_with_a_higher_frequency_but_not_that_of_an_explosion():
+    least, most = substeps.RAISED
+    assert substeps.raised((100.0, 7.0), (50.0, 3.0)) == (100.0 * least, 7.0)
+    assert substeps.raised((100.0, 7.0), (250.0, 30.0)) == (250.0, 30.0)
+    assert substeps.raised((100.0, 7.0), (1e9, 1e9)) == (100.0 * most, 7.0 * most**2)
+
+
 def test_a_frame_keeps_its_stages_until_the_margin_of_the_damping_is_used_up():
     dt = 1e-3
     rate = 4.0 / (MARGIN * dt)  # two stages, whose share is chosen for 4

@@ -19,6 +19,7 @@ TOLERANCE = 0.02  # gap between the estimate and its bound that ends the restart
 LITTLE = 0.01  # change of shape, see kernels/shape.py, that moves a rate by some percent at most
 MUCH = 0.2  # change that makes a frequency at most SLOWER times as large, a damping its square
 SLOWER = 4.0
+SQUASHED = 0.25  # of the volume at rest: where kernels/neo_hookean.py begins to stiffen
 SEED = 20051125
 
 
@@ -55,6 +56,7 @@ class Spectrum:
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
         self._before = wp.empty(model.n_tet, dtype=wp.mat33)
         self._change = wp.empty(model.n_body, dtype=float)
+        self._squashed = wp.empty(1, dtype=int)
         self._at: np.ndarray | None = None
         self._of_bodies = np.zeros((2, model.n_body))
 
@@ -71,6 +73,14 @@ class Spectrum:
             self._of_bodies = np.array([squares**0.5, self._damping_rates(x)])
         omega, rate = self._of_bodies.max(axis=1).tolist()
         return omega, rate
+
+    def rises(self, x: wp.array) -> bool:
+        """Whether a tet is so flat at ``x`` [m] that rates may rise many times in a few steps."""
+        m = self._model
+        self._squashed.zero_()
+        inputs = [m.tets, m.pose, x, SQUASHED]
+        wp.launch(shape.squashed, dim=m.n_tet, inputs=inputs, outputs=[self._squashed])
+        return bool(self._squashed.numpy()[0])
 
     def _remember(self, x: wp.array) -> None:
         """Keep the shapes at ``x`` [m]."""

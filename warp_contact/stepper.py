@@ -15,7 +15,7 @@ from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.rest import Rest, keep_forces
 from warp_contact.room import enlarged
 from warp_contact.spectrum import Spectrum
-from warp_contact.substeps import raised, stays_damped, stays_stable
+from warp_contact.substeps import PART, raised, stays_damped, stays_stable
 from warp_contact.types import Capacity, Model, State
 from warp_contact.work import Work, allocate_work
 
@@ -76,7 +76,8 @@ class Stepper:
         """Step frame number ``frame``.
 
         A frame that outgrew its buffers, or whose step turned out too long for the deformation
-        that came, is repeated from its start.
+        that came, is repeated from its start. Where tets are nearly flat, that is looked at within
+        the frame too.
 
         Raises:
             SimulationError: no step is stable, or the state does not stay finite; it is then that
@@ -94,11 +95,12 @@ class Stepper:
         omega, rate = self.rates or self.spectrum.rates(self._state.x)
         self._pace.check(self._state, omega, frame)
         last, halved = self.n, 0
+        in_parts = self._rises()
         for _ in range(ATTEMPTS):
-            dt = self._run(omega, rate, last, frame)
+            dt, misfit = self._run(omega, rate, last, frame, in_parts)
             while self.grow():
-                dt = self._run(omega, rate, last, frame)
-            after, wrong = self._rates_after()
+                dt, misfit = self._run(omega, rate, last, frame, in_parts)
+            after, wrong = misfit or self._rates_after()
             if wrong:
                 self._go_back()
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
@@ -106,10 +108,12 @@ class Stepper:
                 halved += 1
                 omega, rate = 2.0 * omega, 2.0 * rate
                 continue
-            stable = self.wanted is not None or stays_stable(dt, after[0], rate)
-            if stable and stays_damped(dt, rate, after[1]):
+            if not self._fits(dt, rate, after):
+                omega, rate = raised((omega, rate), after)
+            elif in_parts or not self._rises():
                 break
-            omega, rate = raised((omega, rate), after)
+            else:
+                in_parts = True
             self._go_back()
         else:
             raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
@@ -127,6 +131,15 @@ class Stepper:
             tet = flattest_tet(self._model, self._state.x)
             return NO_RATES, f"stiffness is no longer finite, the flattest is {tet}"
         return after, ""
+
+    def _rises(self) -> bool:
+        """Whether the rates may rise within a few steps from here, and the steps may follow."""
+        return self.wanted is None and self.spectrum.rises(self._state.x)
+
+    def _fits(self, dt: float, rate: float, after: tuple[float, float]) -> bool:
+        """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] do for rates ``after`` them."""
+        stable = self.wanted is not None or stays_stable(dt, after[0], rate)
+        return stable and stays_damped(dt, rate, after[1])
 
     def look_anew(self) -> None:
         """Before the next frame: positions were set from outside."""
@@ -184,8 +197,14 @@ class Stepper:
         self.dt = float(values["dt"]) if "dt" in values else None
         self.rates = tuple(map(float, values["rates"])) if "rates" in values else None
 
-    def _run(self, omega: float, rate: float, last: int, frame: int) -> float:
-        """Step the frame at the rates [1/s] given, after ``last`` steps; return the step [s]."""
+    def _run(
+        self, omega: float, rate: float, last: int, frame: int, in_parts: bool
+    ) -> tuple[float, tuple[tuple[float, float], str] | None]:
+        """Step the frame at the rates [1/s] given, after ``last`` steps; return the step [s].
+
+        With ``in_parts`` it ends where the step does not fit any more, and returns what
+        ``_rates_after`` says there as well.
+        """
         work = self.work
         if self.rest:
             self.rest.begin_frame(self._state, work)
@@ -204,10 +223,16 @@ class Stepper:
         work.contacts.needed.zero_()
         work.deep_found.zero_()
         work.bodies.rebuild()
-        work.steps.fill_(n)
-        wp.capture_launch(self._graph(stages))
         self.n = n
-        return dt
+        part = PART if in_parts else n
+        for first in range(0, n, part):
+            if first > 0:
+                found = self._rates_after()
+                if found[1] or not self._fits(dt, rate, found[0]):
+                    return dt, found
+            work.steps.fill_(min(part, n - first))
+            wp.capture_launch(self._graph(stages))
+        return dt, None
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured steps of a frame, with so many stages of damping."""

@@ -61,6 +61,11 @@ def dense() -> dict[str, float]:
     return {GAINED: max(attempt(case.build, "surface", limit=case.limit).gained, 0.0)}
 
 
+def crushed() -> dict[str, float]:
+    """A cube under one of 10^4 times its mass at 2 m/s."""
+    return {GAINED: attempt(partial(ratios.heavy, 0.2, 2.0)).gained}
+
+
 def sheet() -> dict[str, float]:
     """A7 block on a membrane."""
     sweeps, steps, flag = (wp.zeros(1, dtype=int) for _ in range(3))

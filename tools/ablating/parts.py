@@ -8,7 +8,7 @@ import warp as wp
 
 from ablating import apart, impacts, loads, off
 from ablating.off import without
-from warp_contact import candidates, depth, impulse, solver, substeps, surface
+from warp_contact import candidates, depth, impulse, solver, stepper, substeps, surface
 from warp_contact.kernels import crossing, edge_contact, vertex_contact
 
 
@@ -195,6 +195,13 @@ PARTS = {
     ),
     "repeats": Part(
         "frames repeated in shorter steps", off.without_repeats, apart.pulled, apart.FLATTENED, 1.0
+    ),
+    "within": Part(
+        "looks at the step within frames that flatten tets",
+        without(stepper, "PART", 10**9),
+        loads.crushed,
+        loads.GAINED,
+        GAIN,
     ),
     "steady": Part(
         "steps that hardly grow again",

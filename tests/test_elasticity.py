@@ -22,10 +22,10 @@ def barrier(j: np.ndarray) -> np.ndarray:
     """What keeps J above 0: a logarithm from 1/4 on, a parabola from 1/20 on."""
     c, j0 = np.clip(j, 0.05, 0.25), 0.25
     d, log = c - j0, np.log(c / j0)
-    slope = -20.0 * (2.0 * d * log + d * d / c)
-    bend = -20.0 * (2.0 * log + 4.0 * d / c - (d / c) ** 2)
+    slope = -10.0 * (2.0 * d * log + d * d / c)
+    bend = -10.0 * (2.0 * log + 4.0 * d / c - (d / c) ** 2)
     e = np.minimum(j - c, 0.0)
-    return -20.0 * d * d * log + e * slope + e * e * bend / 2.0
+    return -10.0 * d * d * log + e * slope + e * e * bend / 2.0
 
 
 def density(material, f: np.ndarray) -> np.ndarray:

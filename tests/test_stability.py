@@ -73,8 +73,8 @@ def test_a_corner_that_slides_up_a_bent_face_gains_next_to_nothing():
 
 
 def test_a_cube_is_crushed_to_a_tenth_and_comes_back():
-    # 30 % of the energy more, and tets inside out, where steps are looked at between frames only.
-    r = attempt(partial(ratios.heavy, 0.2, 2.0))
+    # Not finite in any repeat of a frame whose steps are looked at at its end only.
+    r = attempt(partial(ratios.heavy, 0.1, 5.0))
     print(r)
     assert level(r) in (outcome.GOOD, outcome.EXCELLENT)
     assert r.lowest < 0.1 < r.volume

@@ -106,6 +106,7 @@ class Stepper:
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
                     raise SimulationError(f"frame {frame}: {wrong} ({self.n} substeps)")
                 halved += 1
+                in_parts = True
                 omega, rate = 2.0 * omega, 2.0 * rate
                 continue
             if not self._fits(dt, rate, after):

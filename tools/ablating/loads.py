@@ -62,8 +62,11 @@ def dense() -> dict[str, float]:
 
 
 def crushed() -> dict[str, float]:
-    """A cube under one of 10^4 times its mass at 2 m/s."""
-    return {GAINED: attempt(partial(ratios.heavy, 0.2, 2.0)).gained}
+    """Cube struck by one of 10^4 times its mass."""
+    r = attempt(partial(ratios.heavy, 0.1, 5.0))
+    if r.error:
+        raise wc.SimulationError(r.error)
+    return {GAINED: r.gained}
 
 
 def sheet() -> dict[str, float]:

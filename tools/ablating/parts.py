@@ -197,7 +197,7 @@ PARTS = {
         "frames repeated in shorter steps", off.without_repeats, apart.pulled, apart.FLATTENED, 1.0
     ),
     "within": Part(
-        "looks at the step within frames that flatten tets",
+        "looks within frames with flat tets",
         without(stepper, "PART", 10**9),
         loads.crushed,
         loads.GAINED,

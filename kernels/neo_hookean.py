@@ -12,8 +12,8 @@ logarithm between 1/20 and 1/4: it is finite and pushes back for flat and invert
 
 Without b (not in the source) a column whose sides are free carries at most 0.23, 0.81 or 2.2 E
 along its axis, for a ratio of 0, 0.3 or 0.4; what presses harder turns it inside out, however short
-the step. b adds 14 l to the pressure before J = 1/20, and nothing above J0: 27 E in all for a
-ratio of 0.4.
+the step. b adds nothing to the pressure above J0, 14 l at J = 1/20 and 32 l at J = 0; l = 1.8 E for
+a ratio of 0.4.
 
 A row of ``param`` is (mu, lam, beta).
 

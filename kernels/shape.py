@@ -58,9 +58,9 @@ def squashed(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     least: float,  # volume, of that at rest
     # in, out
-    any: wp.array[int],  # (1,) set to 1 where a tet has less
+    found: wp.array[int],  # (1,) set to 1 where a tet has less
 ):
     """One thread per tet."""
     q = wp.tid()
     if wp.determinant(element.rate(q, tets, pose, x)) < least:
-        any[0] = 1
+        found[0] = 1

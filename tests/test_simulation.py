@@ -15,7 +15,6 @@ from warp_contact import (
     box,
     sphere,
     stepper,
-    substeps,
 )
 
 G = 9.81
@@ -195,46 +194,103 @@ def test_so_is_one_whose_end_has_no_finite_stiffness(monkeypatch, times):
     assert 2 * other.substeps - 1 <= sim.substeps <= 2 * other.substeps
 
 
-def one_frame(monkeypatch, size: float, part: int, second=lambda found: found):
-    """A free block let go at ``size`` of its lengths, looked at every ``part`` steps of a frame.
-
-    Returns it after the frame, and what the looks found, the second of them through ``second``.
-    """
+def let_go(size: float, **options) -> Simulation:
+    """A free block at ``size`` of its lengths, before its first frame."""
     scene = Scene(gravity=(0.0, 0.0, 0.0))
     mesh = box(0.1, 2)
     scene.add_body(mesh, DRY)
-    sim = Simulation(scene, fps=200)
+    sim = Simulation(scene, fps=200, **options)
     sim.set_positions(0, size * mesh.vertices)
-    rates, found = sim._stepper.spectrum.rates, []
-
-    def look(x):
-        found.append(rates(x))
-        return second(found[-1]) if len(found) == 2 else found[-1]
-
-    monkeypatch.setattr(sim._stepper.spectrum, "rates", look)
-    monkeypatch.setattr(stepper, "PART", part)
-    sim.step_frame()
-    return sim, found
+    return sim
 
 
-def test_looks_within_a_frame_change_nothing_where_its_steps_do(monkeypatch):
-    often, looks = one_frame(monkeypatch, 0.5, 3)
-    once, two = one_frame(monkeypatch, 0.5, 1000)
-    assert len(looks) > len(two) == 2  # the start and the end
-    assert often.substeps == once.substeps
+@pytest.fixture
+def looks(monkeypatch):
+    """A frame of a run, looked at every ``part`` steps: what was found.
+
+    What the second look finds, the first after the start, goes through ``second``.
+    """
+
+    def step(sim: Simulation, part: int, second=lambda found: found) -> list:
+        rates, found = sim._stepper.spectrum.rates, []
+
+        def look(x):
+            found.append(rates(x))
+            return second(found[-1]) if len(found) == 2 else found[-1]
+
+        with monkeypatch.context() as patch:
+            patch.setattr(sim._stepper.spectrum, "rates", look)
+            patch.setattr(stepper, "PART", part)
+            sim.step_frame()
+        return found
+
+    return step
+
+
+def test_looks_within_a_frame_change_nothing_where_its_steps_do(looks):
+    often, once = let_go(0.5), let_go(0.5)
+    found = looks(often, 3)
+    assert len(found) == 1 + -(-often.substeps // 3) > 2
+    assert len(looks(once, 1000)) == 2  # the start and the end
     np.testing.assert_array_equal(often.positions(), once.positions())
     np.testing.assert_array_equal(often.velocities(), once.velocities())
 
 
-def test_where_no_tet_is_flat_there_are_none(monkeypatch):
-    assert len(one_frame(monkeypatch, 0.7, 3)[1]) == 2
+def test_there_are_none_where_no_tet_is_flat_or_the_steps_are_fixed(looks):
+    assert len(looks(let_go(0.7), 3)) == 2
+    assert len(looks(let_go(0.5, substeps=20), 3)) == 2
 
 
-def test_a_step_that_is_too_long_within_a_frame_repeats_it(monkeypatch):
-    usual = one_frame(monkeypatch, 0.5, 3)[0].substeps
-    stiffer = one_frame(monkeypatch, 0.5, 3, lambda found: (1e9, found[1]))[0].substeps
-    most = substeps.RAISED[1]
-    assert most * (usual - 1) < stiffer <= most * usual
+def test_a_frame_that_ends_flat_is_done_again_with_looks(looks):
+    sim = let_go(0.7)
+    sim.set_velocity(0, -100.0 * sim.positions(0))  # within a frame to about half of its lengths
+    found = looks(sim, 1)
+    assert sim._stepper.spectrum.flat(sim.state.x)
+    assert len(found) >= 2 + sim.substeps
+
+
+def test_a_step_that_is_too_long_within_a_frame_cuts_it_short_and_repeats_it(looks):
+    sim = let_go(0.5)
+    found = looks(sim, 3, lambda found: (1e9, found[1]))
+    assert len(found) == 2 + -(-sim.substeps // 3)  # the start, the one too long, the repeat
+    usual, same = let_go(0.5), let_go(0.5, substeps=sim.substeps)
+    usual.step_frame()
+    same.step_frame()
+    assert sim.substeps > 2 * usual.substeps
+    np.testing.assert_array_equal(sim.positions(), same.positions())
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-3])
+def test_a_block_is_pressed_flat_within_a_frame(damping):
+    mesh = box(0.1, 3)
+    z = mesh.vertices[:, 2]
+    top, low = np.flatnonzero(z > 0.049), np.flatnonzero(z < -0.049)
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    rubber = NeoHookean(1e6, 0.45, 1000.0, damping)
+    body = scene.add_body(mesh, rubber, fixed=np.r_[top, low])
+    sim = Simulation(scene, fps=60)
+    sim.set_positions(body, mesh.vertices * [1.0, 1.0, 0.3])
+    sim.set_velocity(body, (0.0, 0.0, -0.025 * sim.fps), top)  # to a twentieth; 20 times as fast
+    sim.step_frame()
+    assert 0.0 < sim.measure().volume_ratio < 0.05
+    assert sim.substeps < 10_000  # some 900 to 2000; those of an exploded state were 266 469
+
+
+def test_buffers_outgrown_within_a_frame_end_it_at_once(looks, monkeypatch):
+    sim, calm = let_go(0.5), let_go(0.5)
+    expected = looks(calm, 3)
+    enlarged, asked = stepper.enlarged, []
+
+    def outgrown(work):
+        asked.append(len(asked))
+        if len(asked) == 2:  # first after the look for overlaps at the start, then after a part
+            work.contacts.needed.fill_(work.capacity.contacts + 1)
+        return enlarged(work)
+
+    monkeypatch.setattr(stepper, "enlarged", outgrown)
+    assert looks(sim, 3) == expected  # no more: not one at what the outgrown buffers left
+    assert sim._stepper.work.capacity.contacts > calm._stepper.work.capacity.contacts
+    np.testing.assert_array_equal(sim.positions(), calm.positions())
 
 
 def test_set_velocity_moves_pinned_vertices_and_leaves_them_to_nothing_else():
@@ -326,7 +382,7 @@ def test_without_memory_for_larger_buffers_the_last_frame_stays(monkeypatch):
     def outgrow(self, *rates):
         self._state.x.fill_(1.0)  # a frame that is not finished
         self.work.contacts.needed.fill_(10_000)
-        return 1.0, None
+        return 1.0, (0.0, 0.0), ""
 
     with monkeypatch.context() as patch:
         patch.setattr(stepper.Stepper, "_allocate", allocate_no_more)

@@ -207,8 +207,8 @@ def test_rates_may_rise_where_tets_are_flat_however_they_lie(volume, blob, build
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     y = (x @ turn.T) @ np.diag([1.0, 2.0, volume / 2.0]) + [3.0, 0.0, 0.0]
-    assert not spectrum.rises(wp.array(x, dtype=wp.vec3))
-    assert spectrum.rises(wp.array(y, dtype=wp.vec3)) == (volume < 0.25)
+    assert not spectrum.flat(wp.array(x, dtype=wp.vec3))
+    assert spectrum.flat(wp.array(y, dtype=wp.vec3)) == (volume < 0.25)
 
 
 def test_rates_without_bound_are_not_kept(blob, build_model):

@@ -63,10 +63,15 @@ def test_a_step_is_refused_before_it_is_unstable(z, least):
 
 
 def test_a_frame_is_repeated_with_a_higher_frequency_but_not_that_of_an_explosion():
-    least, most = substeps.RAISED
-    assert substeps.raised((100.0, 7.0), (50.0, 3.0)) == (100.0 * least, 7.0)
-    assert substeps.raised((100.0, 7.0), (250.0, 30.0)) == (250.0, 30.0)
-    assert substeps.raised((100.0, 7.0), (1e9, 1e9)) == (100.0 * most, 7.0 * most**2)
+    dt, most = 1.2 / 100.0, substeps.EXPLODED
+    assert substeps.raised((100.0, 90.0), (50.0, 3.0), dt) == (100.0 * substeps.RAISED, 90.0)
+    assert substeps.raised((100.0, 90.0), (50.0, 3.0), dt, 2.0) == (200.0, 90.0)
+    assert substeps.raised((100.0, 90.0), (250.0, 99.0), dt) == (250.0, 99.0)
+    assert substeps.raised((100.0, 90.0), (1e9, 1e9), dt) == (100.0 * most, 90.0 * most**2)
+    # A step that was shorter than the frequency asked for, without damping at the start.
+    assert substeps.raised((1.0, 0.0), (1e9, 1e9), dt) == pytest.approx(
+        (100.0 * most, most**2 / dt)
+    )
 
 
 def test_a_frame_keeps_its_stages_until_the_margin_of_the_damping_is_used_up():

@@ -6,7 +6,7 @@ import numpy as np
 import warp as wp
 
 from warp_contact import forces
-from warp_contact.kernels import lanczos, shape
+from warp_contact.kernels import lanczos, neo_hookean, shape
 from warp_contact.types import Model
 
 DEPTH = 8  # Lanczos steps of a restart in the first call
@@ -19,7 +19,6 @@ TOLERANCE = 0.02  # gap between the estimate and its bound that ends the restart
 LITTLE = 0.01  # change of shape, see kernels/shape.py, that moves a rate by some percent at most
 MUCH = 0.2  # change that makes a frequency at most SLOWER times as large, a damping its square
 SLOWER = 4.0
-SQUASHED = 0.25  # of the volume at rest: where kernels/neo_hookean.py begins to stiffen
 SEED = 20051125
 
 
@@ -56,7 +55,7 @@ class Spectrum:
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
         self._before = wp.empty(model.n_tet, dtype=wp.mat33)
         self._change = wp.empty(model.n_body, dtype=float)
-        self._squashed = wp.empty(1, dtype=int)
+        self._flat = wp.empty(1, dtype=int)
         self._at: np.ndarray | None = None
         self._of_bodies = np.zeros((2, model.n_body))
 
@@ -74,13 +73,13 @@ class Spectrum:
         omega, rate = self._of_bodies.max(axis=1).tolist()
         return omega, rate
 
-    def rises(self, x: wp.array) -> bool:
+    def flat(self, x: wp.array) -> bool:
         """Whether a tet is so flat at ``x`` [m] that rates may rise many times in a few steps."""
         m = self._model
-        self._squashed.zero_()
-        inputs = [m.tets, m.pose, x, SQUASHED]
-        wp.launch(shape.squashed, dim=m.n_tet, inputs=inputs, outputs=[self._squashed])
-        return bool(self._squashed.numpy()[0])
+        self._flat.zero_()
+        inputs = [m.tets, m.pose, x, neo_hookean.SQUASHED]
+        wp.launch(shape.squashed, dim=m.n_tet, inputs=inputs, outputs=[self._flat])
+        return bool(self._flat.numpy()[0])
 
     def _remember(self, x: wp.array) -> None:
         """Keep the shapes at ``x`` [m]."""

@@ -15,7 +15,7 @@ from warp_contact.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.rest import Rest, keep_forces
 from warp_contact.room import enlarged
 from warp_contact.spectrum import Spectrum
-from warp_contact.substeps import PART, raised, stays_damped, stays_stable
+from warp_contact.substeps import CUT_SHORT, RAISED, raised, served, stays_damped, stays_stable
 from warp_contact.types import Capacity, Model, State
 from warp_contact.work import Work, allocate_work
 
@@ -23,6 +23,7 @@ NEIGHBOURS = 8  # pairs with a contact force for each body that there is room fo
 UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
 HALVED = 3  # times that the steps of a frame are halved because its state, or stiffness, is lost
 NO_RATES = math.inf, math.inf  # of a state that is lost
+PART = 8  # steps between two looks at the rates, in frames that begin or end with a flat tet
 ATTEMPTS = 12  # at a frame, with shorter steps each time
 
 
@@ -76,8 +77,8 @@ class Stepper:
         """Step frame number ``frame``.
 
         A frame that outgrew its buffers, or whose step turned out too long for the deformation
-        that came, is repeated from its start. Where tets are nearly flat, that is looked at within
-        the frame too.
+        that came, is repeated from its start. Where it begins or ends with a tet that is nearly
+        flat, the step is looked at every ``PART`` steps.
 
         Raises:
             SimulationError: no step is stable, or the state does not stay finite; it is then that
@@ -95,35 +96,33 @@ class Stepper:
         omega, rate = self.rates or self.spectrum.rates(self._state.x)
         self._pace.check(self._state, omega, frame)
         last, halved = self.n, 0
-        in_parts = self._rises()
+        in_parts = self._flat()
         for _ in range(ATTEMPTS):
-            dt, misfit = self._run(omega, rate, last, frame, in_parts)
+            dt, after, wrong = self._run(omega, rate, last, frame, in_parts)
             while self.grow():
-                dt, misfit = self._run(omega, rate, last, frame, in_parts)
-            after, wrong = misfit or self._rates_after()
+                dt, after, wrong = self._run(omega, rate, last, frame, in_parts)
+            fits = not wrong and self._fits(dt, rate, after)
+            flat = in_parts or bool(wrong) or self._flat()
+            if fits and (in_parts or not flat):
+                break
+            self._go_back()
             if wrong:
-                self._go_back()
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
                     raise SimulationError(f"frame {frame}: {wrong} ({self.n} substeps)")
                 halved += 1
-                in_parts = True
-                omega, rate = 2.0 * omega, 2.0 * rate
-                continue
-            if not self._fits(dt, rate, after):
-                omega, rate = raised((omega, rate), after)
-            elif in_parts or not self._rises():
-                break
-            else:
-                in_parts = True
-            self._go_back()
+                omega, rate = 2.0 * max(omega, served(dt)), 2.0 * rate
+            elif not fits:
+                least = CUT_SHORT if in_parts else RAISED
+                omega, rate = raised((omega, rate), after, dt, least)
+            in_parts = flat
         else:
             raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
         self.rates = after
         self.dt = dt
         self.search = self.search and bool(self.work.deep_found.numpy()[0])
 
-    def _rates_after(self) -> tuple[tuple[float, float], str]:
-        """Rates at the end of a frame [1/s], and what is wrong there: empty where nothing is."""
+    def _look(self) -> tuple[tuple[float, float], str]:
+        """Rates of the present state [1/s], and what is wrong with it: empty where nothing is."""
         lost = lost_vertex(self._state)
         if lost is not None:
             return NO_RATES, f"{vertex_name(self._model, lost)} is no longer finite"
@@ -133,9 +132,9 @@ class Stepper:
             return NO_RATES, f"stiffness is no longer finite, the flattest is {tet}"
         return after, ""
 
-    def _rises(self) -> bool:
-        """Whether the rates may rise within a few steps from here, and the steps may follow."""
-        return self.wanted is None and self.spectrum.rises(self._state.x)
+    def _flat(self) -> bool:
+        """Whether a tet is flat, and the number of steps free."""
+        return self.wanted is None and self.spectrum.flat(self._state.x)
 
     def _fits(self, dt: float, rate: float, after: tuple[float, float]) -> bool:
         """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] do for rates ``after`` them."""
@@ -200,11 +199,11 @@ class Stepper:
 
     def _run(
         self, omega: float, rate: float, last: int, frame: int, in_parts: bool
-    ) -> tuple[float, tuple[tuple[float, float], str] | None]:
-        """Step the frame at the rates [1/s] given, after ``last`` steps; return the step [s].
+    ) -> tuple[float, tuple[float, float], str]:
+        """Step the frame at the rates [1/s] given, after ``last`` steps.
 
-        With ``in_parts`` it ends where the step does not fit any more, and returns what
-        ``_rates_after`` says there as well.
+        Return the step [s] and what ``_look`` finds at the end. With ``in_parts`` that is where the
+        step does not fit any more; where the buffers were outgrown, nothing was found.
         """
         work = self.work
         if self.rest:
@@ -225,15 +224,17 @@ class Stepper:
         work.deep_found.zero_()
         work.bodies.rebuild()
         self.n = n
+        after, wrong = NO_RATES, ""
         part = PART if in_parts else n
         for first in range(0, n, part):
-            if first > 0:
-                found = self._rates_after()
-                if found[1] or not self._fits(dt, rate, found[0]):
-                    return dt, found
             work.steps.fill_(min(part, n - first))
             wp.capture_launch(self._graph(stages))
-        return dt, None
+            if enlarged(work) is not None:
+                break
+            after, wrong = self._look()
+            if wrong or not self._fits(dt, rate, after):
+                break
+        return dt, after, wrong
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured steps of a frame, with so many stages of damping."""

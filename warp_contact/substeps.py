@@ -9,21 +9,18 @@ omega is the largest frequency of the elastic forces [1/s], u the largest relati
 the thickness of the thinnest body [m] and e the shortest mean edge of a body [m]. They are those at
 the start of the frame. While there may be overlaps from before, LINGERING stands for TRAVEL. At its
 end the step must still be below ``UNSTABLE`` of ``forces.longest_step`` / omega, and its damping
-within ``forces.reach``; a frame that fails is repeated at the rates of its end. In frames with tets
-that are nearly flat, whose stiffness rises many times on a short way, this is looked at every
-``PART`` steps.
+within ``forces.reach``; a frame that fails is repeated at the rates found there.
 """
 
 import math
-
-import numpy as np
 
 from warp_contact.forces import longest_step, reach, share_for, stages_for
 
 SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 0.99  # of the longest stable step at the end of a frame, above which it is repeated
-PART = 8  # steps between two looks at the rates in a frame with tets that are nearly flat
-RAISED = 1.2, 4.0  # times the frequency, least and most, in a frame that is repeated
+RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
+CUT_SHORT = 2.0  # the same, in one whose steps were seen to be too long before its end
+EXPLODED = 4.0  # times the frequency that the step was long enough for, at most
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
 TRAVEL = 0.1  # of the shortest mean edge: the same, for the tets where something strikes
 LINGERING = 0.025  # as TRAVEL, where overlaps may last some steps
@@ -77,14 +74,25 @@ def stays_damped(dt: float, rate: float, after: float) -> bool:
     return after * dt <= reach(stages_for(rate, dt), share_for(rate, dt))
 
 
-def raised(before: tuple[float, float], after: tuple[float, float]) -> tuple[float, float]:
-    """Frequency and damping rate [1/s] for the repeat of a frame, from those at both its ends.
+def served(dt: float) -> float:
+    """The frequency [1/s] that a step ``dt`` [s] is chosen for, where no other limit counts."""
+    return 2.0 * SAFETY / dt
 
-    Those of a state that has begun to explode are no guide.
+
+def raised(
+    before: tuple[float, float], after: tuple[float, float], dt: float, least: float = RAISED
+) -> tuple[float, float]:
+    """Frequency and damping rate [1/s] for the repeat of a frame whose step was too long.
+
+    Args:
+        before: at its start
+        after: where that was seen; a state that has begun to explode is no guide
+        dt: the step [s]; more than ``before`` may have asked for it
+        least: times the frequency, at least
     """
-    least, most = RAISED
-    omega = np.clip(after[0], least * before[0], most * before[0])
-    return float(omega), float(np.clip(after[1], before[1], most**2 * before[1]))
+    most = EXPLODED * max(before[0], served(dt))
+    fast = max(before[1], min(after[1], EXPLODED**2 * max(before[1], 1.0 / dt)))
+    return min(max(least * before[0], after[0]), most), fast
 
 
 def fault(dt: float, omega: float, speed: float, thickness: float) -> str:

@@ -40,8 +40,7 @@ def cases(quick: bool) -> Iterator[Case]:
 def own_weight(moduli: float) -> Setting:
     """A block, held at its base, whose weight over its section is so many times its modulus.
 
-    There is no contact: what goes inside out here does so by its material, which carries about 15
-    moduli at rest (kernels/neo_hookean.py), and less of what comes on at once.
+    There is no contact: what goes inside out here does so by its material (kernels/neo_hookean.py).
     """
     scene = wc.Scene(DOWN)
     block = wc.box(0.1, 3)

@@ -105,7 +105,7 @@ SWEEPS = {
         "a block falls on another, step left to the solver",
         *("mass ratio", "stiffness ratio", (1.0, 1e4), (1e-4, 1e4), mass_stiffness),
         # Between the cells where it goes inside out, also if held at its base, and those where not.
-        limit=("the upper block's weight is 10 of its moduli", lambda mass: mass / 1e5),
+        limit=("the upper block's weight is 25 of its moduli", lambda mass: mass / 2.5e5),
     ),
     "depth": Sweep(
         "a block starts in a plate",

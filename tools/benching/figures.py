@@ -1,5 +1,6 @@
 """The figures of one case, by name."""
 
+from collections.abc import Callable
 from statistics import median
 from time import perf_counter
 from unittest import mock
@@ -76,15 +77,19 @@ def bound(model, contacts: float) -> float:
 
 def frame_time(sim: wc.Simulation) -> tuple[float, float]:
     """Time of a frame [s], that on the host included, and the part that chooses the step."""
-    times, choice, rates = [], [0.0], sim._stepper.spectrum.rates
+    times, choice, spectrum = [], [0.0], sim._stepper.spectrum
 
-    def timed(x: wp.array) -> tuple[float, float]:
-        start = perf_counter()
-        found = rates(x)
-        choice[0] += perf_counter() - start
-        return found
+    def timed(function: Callable) -> Callable:
+        def called(x: wp.array):
+            start = perf_counter()
+            found = function(x)
+            choice[0] += perf_counter() - start
+            return found
 
-    with mock.patch.object(sim._stepper.spectrum, "rates", timed):
+        return called
+
+    parts = {name: timed(getattr(spectrum, name)) for name in ("rates", "flat")}
+    with mock.patch.multiple(spectrum, **parts):
         for _ in range(SHOWN_FRAMES):
             start = perf_counter()
             sim.step_frame()

@@ -32,10 +32,12 @@ def changes(
     # in
     tets: wp.array[wp.vec4i],  # (n_tet,)
     vert_body: wp.array[int],  # (n_vert,)
+    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
     before: wp.array[wp.mat33],  # (n_tet,) [1/m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
+    least: float,  # volume of a tet that is not flat, of that at rest
     # out, added to
-    change: wp.array[float],  # (n_body,) largest of its tets
+    change: wp.array2d[float],  # (2, n_body) largest of its tets; 1 where one is flat
 ):
     """One thread per tet."""
     q = wp.tid()
@@ -47,20 +49,7 @@ def changes(
             most = wp.max(most, wp.abs(s[i, j]))
     if not wp.ddot(s, s) < NONE or wp.determinant(before[q]) == 0.0:
         most = NONE
-    wp.atomic_max(change, vert_body[tets[q][0]], most)
-
-
-@wp.kernel
-def squashed(
-    # in
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    least: float,  # volume, of that at rest
-    # in, out
-    found: wp.array[int],  # (1,) set to 1 where a tet has less
-):
-    """One thread per tet."""
-    q = wp.tid()
+    body = vert_body[tets[q][0]]
+    wp.atomic_max(change, 0, body, most)
     if wp.determinant(element.rate(q, tets, pose, x)) < least:
-        found[0] = 1
+        change[1, body] = 1.0

@@ -245,7 +245,7 @@ def test_a_frame_that_ends_flat_is_done_again_with_looks(looks):
     sim = let_go(0.7)
     sim.set_velocity(0, -100.0 * sim.positions(0))  # within a frame to about half of its lengths
     found = looks(sim, 1)
-    assert sim._stepper.spectrum.flat(sim.state.x)
+    assert sim._stepper.spectrum.flat
     assert len(found) >= 2 + sim.substeps
 
 

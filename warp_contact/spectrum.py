@@ -35,6 +35,10 @@ class Spectrum:
 
     Later calls start from the last result and need ``SHORT`` products with K, or twice as many.
     Deterministic: the first start vector is a fixed random one. Reads back once per restart.
+
+    Attributes:
+        flat: whether a tet was so flat, where ``rates`` were last asked for, that they may rise
+            many times in a few steps
     """
 
     def __init__(self, model: Model) -> None:
@@ -53,9 +57,9 @@ class Spectrum:
         self._noise = wp.array(_unit(noise, model), dtype=wp.vec3)
         self._start: dict[Callable, wp.array] = {}
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
-        self._before = wp.empty(model.n_tet, dtype=wp.mat33)
-        self._change = wp.empty(model.n_body, dtype=float)
-        self._flat = wp.empty(1, dtype=int)
+        self._before = wp.zeros(model.n_tet, dtype=wp.mat33)
+        self._change = wp.empty((2, model.n_body), dtype=float)
+        self.flat = False
         self._at: np.ndarray | None = None
         self._of_bodies = np.zeros((2, model.n_body))
 
@@ -65,7 +69,9 @@ class Spectrum:
         Rigid motion changes no rate. A body whose own rates are far below the largest may change
         its shape by more than the others until they are found again.
         """
-        if self._at is None or not self._close(x):
+        change, flat = self._changes(x)
+        self.flat = bool(flat.any())
+        if self._at is None or not self._close(change):
             self._at = x.numpy().copy()
             self._remember(x)
             squares = self._bounds(forces.apply_stiffness, x)
@@ -73,29 +79,25 @@ class Spectrum:
         omega, rate = self._of_bodies.max(axis=1).tolist()
         return omega, rate
 
-    def flat(self, x: wp.array) -> bool:
-        """Whether a tet is so flat at ``x`` [m] that rates may rise many times in a few steps."""
-        m = self._model
-        self._flat.zero_()
-        inputs = [m.tets, m.pose, x, neo_hookean.SQUASHED]
-        wp.launch(shape.squashed, dim=m.n_tet, inputs=inputs, outputs=[self._flat])
-        return bool(self._flat.numpy()[0])
-
     def _remember(self, x: wp.array) -> None:
         """Keep the shapes at ``x`` [m]."""
         m = self._model
         wp.launch(shape.remember, dim=m.n_tet, inputs=[m.tets, x], outputs=[self._before])
 
-    def _close(self, x: wp.array) -> bool:
-        """Whether the rates at the shapes kept do for those at ``x`` [m]."""
+    def _changes(self, x: wp.array) -> np.ndarray:
+        """How far shapes at ``x`` [m] are from those kept, and who has a flat tet: (2, n_body)."""
         m = self._model
         self._change.zero_()
-        inputs = [m.tets, m.vert_body, self._before, x]
+        inputs = [m.tets, m.vert_body, m.pose, self._before, x, neo_hookean.SQUASHED]
         wp.launch(shape.changes, dim=m.n_tet, inputs=inputs, outputs=[self._change])
+        return self._change.numpy()
+
+    def _close(self, change: np.ndarray) -> bool:
+        """Whether the rates at the shapes kept do after such changes, shape (n_body,)."""
         most = self._of_bodies.max(axis=1, keepdims=True)
         slow = (self._of_bodies * [[SLOWER], [SLOWER**2]] <= most).all(axis=0)
         allowed = np.where(slow, MUCH, LITTLE)
-        return bool(np.isfinite(most).all() and (self._change.numpy() <= allowed).all())
+        return bool(np.isfinite(most).all() and (change <= allowed).all())
 
     def omega(self, x: wp.array) -> float:
         """Angular frequency [1/s] of the fastest mode at the positions ``x`` [m].
@@ -113,7 +115,7 @@ class Spectrum:
         """What the next calls start from."""
         starts = {apply.__name__: start.numpy() for apply, start in self._start.items()}
         if self._at is not None:
-            starts |= {"at": self._at, "of_bodies": self._of_bodies}
+            starts |= {"at": self._at, "of_bodies": self._of_bodies, "flat": np.array(self.flat)}
         return starts
 
     def start_from(self, starts: dict[str, np.ndarray]) -> None:
@@ -128,6 +130,7 @@ class Spectrum:
         if self._at is not None:
             self._remember(wp.array(self._at, dtype=wp.vec3))
         self._of_bodies = starts.get("of_bodies", self._of_bodies)
+        self.flat = bool(starts.get("flat", False))
 
     def _damping_rates(self, x: wp.array) -> np.ndarray:
         """Bounds on the eigenvalues [1/s] of M^-1 C of each body, shape (n_body,)."""

@@ -133,8 +133,8 @@ class Stepper:
         return after, ""
 
     def _flat(self) -> bool:
-        """Whether a tet is flat, and the number of steps free."""
-        return self.wanted is None and self.spectrum.flat(self._state.x)
+        """Whether a tet was flat at the last look, and the number of steps is free."""
+        return self.wanted is None and self.spectrum.flat
 
     def _fits(self, dt: float, rate: float, after: tuple[float, float]) -> bool:
         """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] do for rates ``after`` them."""

@@ -23,6 +23,8 @@ from warp_contact.kernels.options import OPTIONS
 wp.set_module_options(OPTIONS)
 
 TURN = wp.constant(0.1)  # gap times gradient above which a surface cannot take the torque
+WIDE = wp.constant(0.1)  # and above which there is no friction
+COUNTED = wp.constant(1.0)  # part of the torque's weight that the sweeps count
 STEEP = wp.constant(8.0)  # gradient times edge of a triangle too thin or too tilted for it
 
 
@@ -94,13 +96,14 @@ def begin_contacts(
             to.turn = mat53()
         elif w > 0.0 and not at.on_plane:
             to.ramp = slope(at, x0)
-        if largest * wp.abs(to.gap) > TURN or at.on_plane:
+        across = largest * wp.abs(to.gap)
+        if across > WIDE and not at.on_plane:
+            to.friction = 0.0
+            to.ramp = wp.vec3(0.0, 0.0, 0.0)
+        if across > TURN or at.on_plane:
             to.gap = 0.0
-            if not at.on_plane:
-                to.friction = 0.0
-                to.ramp = wp.vec3(0.0, 0.0, 0.0)
         if to.gap != 0.0 and (to.friction > 0.0 or wp.length_sq(to.ramp) > 0.0):
-            to.inv_mass_turning = w + torque_weight(at, graph, bodies, to.gap, to.turn)
+            to.inv_mass_turning = w + COUNTED * torque_weight(at, graph, bodies, to.gap, to.turn)
         constraint[c] = to
         if c >= first[0]:
             impulse[c] = Impulse()

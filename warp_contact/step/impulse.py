@@ -7,6 +7,7 @@ import warp as wp
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
+from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import constraint, pair_impulses
 from warp_contact.kernels.impulse import impulse as kernels
@@ -87,9 +88,10 @@ def record(work: Work) -> None:
 
 def _solve_from_last(model: Model, state: State, work: Work) -> None:
     begin(model, state.x, work)
-    warm_start.recall_edges(work)
-    warm_start.recall_vertices(work)
-    apply(model, state.v, work)
+    if on("warm start"):
+        warm_start.recall_edges(work)
+        warm_start.recall_vertices(work)
+        apply(model, state.v, work)
     exchange(model, state.v, work)
 
 
@@ -113,6 +115,7 @@ def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
 
 def _sweep(model: Model, v: wp.array, work: Work, last: bool = False) -> None:
     c, s, limits = work.contacts, work.sweeps, _limits(work)
+    last = last or not on("extrapolation")
     launch_over(
         kernels.solve_contacts,
         work.capacity.contacts,

@@ -158,7 +158,7 @@ def free(quick: bool) -> Panel:
     """A6: momentum, and with it energy."""
 
     def build() -> wc.Scene:
-        return collision.build((3, 5), "head-on", DENSER)
+        return collision.thrown((3, 5), "head-on", DENSER)
 
     frames = round(FREE_TIME * FREE_FPS)
     title = "A6 free collision 1:10\n{} [of that at the start]"

@@ -10,32 +10,15 @@ that what differs from the simulator is due to these and what does not is due to
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 import warp_contact as wc
+from verification.setup import on_face
 from warp_contact.scene import Body
 
 
-@dataclass
-class Run:
-    """What the bars did.
-
-    Attributes:
-        impulse: between the bars, of each frame [N s], shape (n,)
-        energy: at the ends of the frames, of that at the start, shape (n,)
-        mass: of the vertices of both bars [kg], shape (n_vert,)
-        v: velocities at the end [m/s], shape (n_vert, 3)
-    """
-
-    impulse: np.ndarray
-    energy: np.ndarray
-    mass: np.ndarray
-    v: np.ndarray
-
-
-def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> Run:
+def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> tuple[np.ndarray, ...]:
     """Run two bars along z, the lower first and Poisson ratio 0, without gravity.
 
     Args:
@@ -43,11 +26,20 @@ def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> Run:
         frame: duration of a frame [s]
         steps: of each frame
 
+    Returns:
+        impulses between the bars in each frame [N s]; the energy after each, of that at the start;
+        masses of the vertices [kg]; their velocities at the end [m/s], shape (n_vert, 3)
+
     Raises:
         ValueError: the vertices at the ends do not face each other
     """
     lower, upper = scene.bodies
-    below, above, start = facing(lower, upper)
+    below = np.flatnonzero(on_face(lower.mesh, 2, 1))
+    above = np.flatnonzero(on_face(upper.mesh, 2, -1))
+    if len(below) != len(above) or not np.allclose(lower.x[below, :2], upper.x[above, :2]):
+        raise ValueError("the vertices at the ends of the bars do not face each other")
+    start = upper.x[above, 2] - lower.x[below, 2]
+    above += len(lower.x)
     mass = np.concatenate([masses(lower), masses(upper)])
     reduced = 1.0 / (1.0 / mass[below] + 1.0 / mass[above])
     k = np.concatenate([stiffness(lower), stiffness(upper)])
@@ -76,23 +68,7 @@ def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> Run:
             u += h * v
             impulse += j.sum()
         rows.append((impulse, energy() / first))
-    return Run(*np.array(rows).T, mass, v)
-
-
-def facing(lower: Body, upper: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices at the upper end of one bar and the lower of the other, and their gaps [m].
-
-    Those of the upper bar count on from those of the lower one.
-    """
-    ends = []
-    for body, side in ((lower, 1.0), (upper, -1.0)):
-        z = side * body.x[:, 2]
-        at = np.flatnonzero(z > z.max() - 1e-6 * np.ptp(z))
-        ends.append(at[np.lexsort(body.x[at, :2].T)])
-    a, b = lower.x[ends[0]], upper.x[ends[1]]
-    if a.shape != b.shape or not np.allclose(a[:, :2], b[:, :2]):
-        raise ValueError("the vertices at the ends of the bars do not face each other")
-    return ends[0], ends[1] + len(lower.x), b[:, 2] - a[:, 2]
+    return *np.array(rows).T, mass, v
 
 
 def masses(body: Body) -> np.ndarray:

@@ -9,15 +9,14 @@ the force that is measured, so that the distance of the held plane, some 7 a, en
 order only. The second moment of p gives a^2 = 5 / 2 sum F_i r_i^2 / F.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
+from measure.figure import Figure, relative, zero
 
 import warp_contact as wc
-from verification.figure import Figure, relative, zero
-from verification.relax import relax, step_rate
-from verification.setup import Ask, Pose
-from verification.weight import vertex_areas
+from verification.relax import rest, step_rate
+from verification.setup import ALIGNED, Ask, Pose, vertex_areas
 from warp_contact import shapes
 
 RADIUS, YOUNG, POISSON, DENSITY = 0.1, 1e6, 0.3, 1000.0  # [m], [Pa], [-], [kg/m^3]
@@ -26,10 +25,9 @@ LOADS = 5.0, 10.0, 20.0  # of the depths that are imposed [N]
 COUNTS = 1, 2, 4  # N
 RINGS = {1: 6, 2: 8, 4: 12}  # of the mesh, for each N; 3/4 as many layers
 SETTLE = 8.0  # 1 / (slowest frequency)
-SAMPLE = 0.2  # part of the frames at the end that is averaged
-PAIRS = {  # case: (radii [m], moduli [Pa], force [N])
-    "two equal spheres": ((0.1, 0.1), (1e6, 1e6), 5.0),
-    "soft on stiff sphere": ((0.1, 0.2), (1e6, 1e7), 5.0),
+PAIRS = {  # case: (radii [m], the first RADIUS, moduli [Pa], force [N])
+    "two equal spheres": ((RADIUS, 0.1), (1e6, 1e6), 5.0),
+    "soft on stiff sphere": ((RADIUS, 0.2), (1e6, 1e7), 5.0),
 }
 
 # Errors of linear triangles with an exact active set, plane strain: good is twice that, best half.
@@ -40,11 +38,6 @@ SLOPE = 0.1, 0.05, 0.01
 OVERALL = "pressure, L2 error"  # name of the figure
 
 
-def around(base: float) -> tuple[float, float, float]:
-    """Limits about the error of the textbook method."""
-    return 2.0 * base, base, 0.5 * base
-
-
 def modulus(*youngs: float) -> float:
     """E* [Pa]; a single body is on something rigid."""
     return 1.0 / sum((1.0 - POISSON**2) / e for e in youngs)
@@ -53,6 +46,9 @@ def modulus(*youngs: float) -> float:
 def contact_radius(force: float, radius: float, e_star: float) -> float:
     """Exact a [m]."""
     return float(np.cbrt(0.75 * force * radius / e_star))
+
+
+CONTACT = contact_radius(LOADS[1], RADIUS, modulus(YOUNG))  # a that the meshes are made for [m]
 
 
 def run(ask: Ask) -> Iterator[Figure]:
@@ -87,105 +83,108 @@ def graded(s: np.ndarray, slope: float) -> np.ndarray:
     return np.sinh(k * s) / np.sinh(k)
 
 
-def on_plane(ask: Ask, n: int, pose: Pose) -> Iterator[Figure]:
-    """Force, radius, peak and profile of the pressure."""
-    label = f"A3 sphere on plane, N = {n} {pose}"
-    a = contact_radius(LOADS[1], RADIUS, modulus(YOUNG))
-    sim, p = press(ask, n, a**2 / RADIUS, a, pose)
-    yield from profile(label, sim, p, RADIUS, modulus(YOUNG), n, pose)
-
-
-def press(
-    ask: Ask, n: float, depth: float, a: float, pose: Pose, rings: int | None = None
-) -> tuple[wc.Simulation, np.ndarray]:
-    """Press a sphere onto a plane by ``depth`` [m]; mean pressures of its vertices [Pa]."""
-    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
-    scene.add_plane(pose.out((0.0, 0.0, 1.0)), depth)
-    mesh = cap(RADIUS, a / n, rings or RINGS[n])
-    held = mesh.vertices[:, 2] > 0.999 * HEIGHT
-    scene.add_body(mesh, wc.Corotated(YOUNG, POISSON, DENSITY), rotation=pose.q, fixed=held)
-    respond = ask.respond(100.0 * YOUNG * a / n)
-    sim = wc.Simulation(scene, respond, fps=rate(a / n, YOUNG))
-    return sim, settle(sim, slowest(YOUNG))
-
-
-def rate(size: float, young: float) -> float:
-    """Frames per second for elements of ``size`` [m]."""
-    return step_rate(size, pressure_wave(young))
-
-
-def pressure_wave(young: float) -> float:
+def pressure_wave(young: float, poisson: float = POISSON) -> float:
     """Speed of pressure waves [m/s]."""
-    stiff = young * (1.0 - POISSON) / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
+    stiff = young * (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
     return float(np.sqrt(stiff / DENSITY))
 
 
-def slowest(young: float) -> float:
-    """Frequency of the slowest mode along the axis [1/s]."""
-    return 0.5 * np.pi * pressure_wave(young) / HEIGHT
+def hold(scene: wc.Scene, mesh: wc.TetMesh, material, q, place=(0.0, 0.0, 0.0)) -> None:
+    """Add a body that is held at its plane above."""
+    z = mesh.vertices[:, 2]
+    scene.add_body(mesh, material, place, q, fixed=z > 0.999 * z.max())
 
 
-def settle(sim: wc.Simulation, omega: float) -> np.ndarray:
-    """Let it come to rest, slowest mode ``omega`` [1/s]; mean pressures of the last frames [Pa]."""
-    frames = int(np.ceil(SETTLE / omega * sim.fps))
-    first = int((1.0 - SAMPLE) * frames)
-    p = 0.0
-    for frame in relax(sim, omega, frames):
-        if frame > first:
-            p = p + sim.contact_fields()["pressure"].astype(float) / (frames - first)
-    return p
+def settle(
+    ask: Ask, scene: wc.Scene, size: float, young=YOUNG, poisson=POISSON, height=HEIGHT
+) -> tuple[wc.Simulation, np.ndarray]:
+    """A scene of elements of ``size`` [m] at rest, and mean pressures of its vertices [Pa]."""
+    speed = pressure_wave(young, poisson)
+    sim = wc.Simulation(scene, ask.respond(100.0 * young * size), fps=step_rate(size, speed))
+    omega = 0.5 * np.pi * speed / height
+    p = rest(sim, omega, SETTLE, lambda: sim.contact_fields()["pressure"].astype(float))
+    return sim, p.mean(axis=0)
+
+
+def press(
+    ask: Ask, n: float, depth: float, pose: Pose, rings: int | None = None
+) -> tuple[wc.Simulation, np.ndarray]:
+    """Press a sphere onto a plane by ``depth`` [m]."""
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
+    scene.add_plane(pose.out((0.0, 0.0, 1.0)), depth)
+    mesh = cap(RADIUS, CONTACT / n, rings or RINGS[n])
+    hold(scene, mesh, wc.Corotated(YOUNG, POISSON, DENSITY), pose.q)
+    return settle(ask, scene, CONTACT / n)
+
+
+def on_plane(ask: Ask, n: int, pose: Pose) -> Iterator[Figure]:
+    """Force, radius, peak and profile of the pressure."""
+    sim, p = press(ask, n, CONTACT**2 / RADIUS, pose)
+    label = f"A3 sphere on plane, N = {n} {pose}"
+    yield from below(label, sim, p, RADIUS, modulus(YOUNG), n, pose)
+
+
+def below(
+    label: str, sim: wc.Simulation, p: np.ndarray, radius: float, e_star: float, n: int, pose: Pose
+) -> Iterator[Figure]:
+    """The pressures below the first sphere against those of Hertz at the same force."""
+
+    def exact(force: float) -> tuple[float, float]:
+        a = contact_radius(force, radius, e_star)
+        return a, 1.5 * force / (np.pi * a**2)
+
+    body = sim.scene.bodies[0]
+    under = np.flatnonzero(on_ball(body))
+    r = np.linalg.norm(pose.back(sim.positions(body)[under])[:, :2], axis=1)
+    found = r, p[under], vertex_areas(sim)[under]
+    yield from profile(label, ("force [N]", "radius"), found, exact, 2.5, n)
 
 
 def profile(
-    label: str, sim: wc.Simulation, p: np.ndarray, radius: float, e_star: float, n: int, pose: Pose
+    label: str, names: tuple[str, str], found: tuple, exact: Callable, moment: float, n: int
 ) -> Iterator[Figure]:
-    """The first body's pressures against those of Hertz at the same force."""
-    body = sim.scene.bodies[0]
-    count = len(body.x)
-    p, area = p[:count], vertex_areas(sim)[:count]
-    r = np.linalg.norm(pose.back(sim.positions(body))[:, :2], axis=1)
-    under = on_ball(body)
-    p, area, r = p[under], area[under], r[under]
+    """Pressures against p0 sqrt(1 - r^2 / a^2).
+
+    Args:
+        label: of the case
+        names: of the force and of a
+        found: places r [m], pressures there [Pa], and how much of the surface each is for
+        exact: a [m] and p0 [Pa] at a force
+        moment: a^2 over the second moment of p
+        n: elements across a
+    """
+    r, p, area = found
     force = float(p @ area)
-    if force <= 0.0:
-        yield zero(label, "force [N]", float("nan"), RADIUS_LIMITS)
+    pressed = force > 0.0
+    yield Figure(label, names[0], force, limits=() if pressed else RADIUS_LIMITS)
+    if not pressed:
         return
-    a = contact_radius(force, radius, e_star)
-    p0 = 1.5 * force / (np.pi * a**2)
-    exact = p0 * np.sqrt(np.maximum(1.0 - (r / a) ** 2, 0.0))
-    yield Figure(label, "force [N]", force)
-    found = float(np.sqrt(2.5 * (p * area) @ r**2 / force))
-    yield relative(label, "radius from the second moment [m]", found, a, RADIUS_LIMITS)
-    yield relative(label, "pressure at the middle [Pa]", p[r.argmin()], p0, around(PEAK[n]))
-    off = float(np.sqrt(area @ (p - exact) ** 2 / (area @ exact**2)))
+    a, p0 = exact(force)
+    radius = np.sqrt(moment * (p * area) @ r**2 / force)
+    yield relative(label, f"{names[1]} from the second moment [m]", radius, a, RADIUS_LIMITS)
+    middle = p[np.abs(r).argmin()]
+    yield relative(label, "pressure at the middle [Pa]", middle, p0, around(PEAK[n]))
+    shape = p0 * np.sqrt(np.maximum(1.0 - (r / a) ** 2, 0.0))
+    off = np.sqrt(area @ (p - shape) ** 2 / (area @ shape**2))
     yield zero(label, OVERALL, off, around(PROFILE[n]))
 
 
+def around(base: float) -> tuple[float, float, float]:
+    """Limits about the error of the textbook method."""
+    return 2.0 * base, base, 0.5 * base
+
+
 def on_ball(body) -> np.ndarray:
-    """Mask of the vertices of the lower side of a cap."""
-    x = body.mesh.vertices
-    r = np.hypot(x[:, 0], x[:, 1])
-    height = x[:, 2] + np.sqrt(np.maximum(curvature(body) ** 2 - r**2, 0.0)) - curvature(body)
-    return np.abs(height) < 1e-9
-
-
-def curvature(body) -> float:
-    """Radius of a cap from the height of its lower rim [m]."""
-    x = body.mesh.vertices
-    low = x[np.hypot(x[:, 0], x[:, 1]) > WIDTH - 1e-9, 2].min()
-    return 0.5 * (WIDTH**2 + low**2) / low
+    """Mask of the vertices of the lower side of a cap of ``RADIUS``."""
+    x, y, z = body.mesh.vertices.T
+    return np.abs(z + np.sqrt(RADIUS**2 - x**2 - y**2) - RADIUS) < 1e-9
 
 
 def exponent(ask: Ask, n: int) -> Iterator[Figure]:
     """Slope of log F over log d; the held plane adds a part linear in F to d."""
-    e_star = modulus(YOUNG)
-    a = contact_radius(LOADS[1], RADIUS, e_star)
-    depths, forces = [], []
-    for load in LOADS:
-        depths.append(contact_radius(load, RADIUS, e_star) ** 2 / RADIUS)
-        sim, _ = press(ask, n, depths[-1], a, Pose())
-        forces.append(sum(sim.measure().forces.values()))
-    slope = float(np.polyfit(np.log(depths), np.log(forces), 1)[0])
+    depths = [contact_radius(f, RADIUS, modulus(YOUNG)) ** 2 / RADIUS for f in LOADS]
+    loads = [sum(press(ask, n, d, ALIGNED)[0].measure().forces.values()) for d in depths]
+    slope = float(np.polyfit(np.log(depths), np.log(loads), 1)[0])
     label = f"A3 sphere on plane, N = {n}"
     yield Figure(label, "exponent of F(d)", slope, 1.5, slope - 1.5, SLOPE)
 
@@ -197,14 +196,9 @@ def on_sphere(ask: Ask, name: str, n: int) -> Iterator[Figure]:
     a = contact_radius(load, radius, e_star)
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
     half = np.radians(20.0) / 2.0  # the lower one upside down, turned by 20 degrees
-    for k, q in enumerate(((0.0, 0.0, 0.0, 1.0), (np.cos(half), np.sin(half), 0.0, 0.0))):
-        mesh = cap(radii[k], a / n, RINGS[n])
-        held = mesh.vertices[:, 2] > 0.999 * HEIGHT
+    for k, q in enumerate((ALIGNED.q, (np.cos(half), np.sin(half), 0.0, 0.0))):
         # The stiffer one denser, for the same step.
         material = wc.Corotated(youngs[k], POISSON, DENSITY * youngs[k] / YOUNG)
-        place = (0.0, 0.0, k * a**2 / radius)
-        scene.add_body(mesh, material, place, q, fixed=held)
-    respond = ask.respond(100.0 * YOUNG * a / n)
-    sim = wc.Simulation(scene, respond, fps=rate(a / n, YOUNG))
-    p = settle(sim, slowest(YOUNG))
-    yield from profile(f"A3 {name}, N = {n}", sim, p, radius, e_star, n, Pose())
+        hold(scene, cap(radii[k], a / n, RINGS[n]), material, q, (0.0, 0.0, k * a**2 / radius))
+    sim, p = settle(ask, scene, a / n)
+    yield from below(f"A3 {name}, N = {n}", sim, p, radius, e_star, n, ALIGNED)

@@ -16,12 +16,12 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
+from measure.figure import Figure
 
 import warp_contact as wc
 from verification import bars, cylinder, friction, hertz
-from verification.figure import Figure
 from verification.relax import relax, step_rate
-from verification.setup import Ask, G, Pose
+from verification.setup import ALIGNED, Ask, G, masses, watch
 
 ELEMENTS = 10, 20, 40, 80  # along the bar
 # Of the sliding block and the resting bar. The first is about the stable step; finer ones differ
@@ -71,34 +71,24 @@ def impact(ask: Ask, counts) -> Iterator[Figure]:
     yield order(label, "order of the energy lost", sizes, lost, IMPACT)
 
 
-def sliding(ask: Ask) -> Iterator[Figure]:
-    """Place of a block on a slope; differences of successive steps, as it is not rigid.
+def in_steps(label: str, name: str, states: list) -> Figure:
+    """Order of the states [m] after the numbers of steps: differences of successive ones."""
+    errors = [np.linalg.norm(b - a) for a, b in pairwise(states)]
+    label = f"{label}, {', '.join(map(str, SUBSTEPS))} steps a frame"
+    return order(label, name, 1.0 / np.array(SUBSTEPS[:-1]), errors, SMOOTH)
 
-    It is in motion from the start: letting go is not smooth.
-    """
+
+def sliding(ask: Ask) -> Iterator[Figure]:
+    """Place of a block on a slope, in motion from the start: letting go is not smooth."""
     scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
     at_rest = friction.begin(ask, scene).positions()
     places = []
     for n in SUBSTEPS:
         sim = wc.Simulation(scene, ask.respond(*friction.PENALTY), FPS, substeps=n)
         sim.state.x.assign(at_rest)
-        for _ in sim.frames(round(SLIDES * FPS)):
-            pass
-        places.append(friction.centre(sim)[0][0])
-    label = f"A8 sliding block, {', '.join(map(str, SUBSTEPS))} steps a frame"
-    sizes = 1.0 / np.array(SUBSTEPS[:-1])
-    yield order(label, "order of the place in dt", sizes, np.diff(places), SMOOTH)
-
-
-def pressure(ask: Ask, counts) -> Iterator[Figure]:
-    """L2 error of the pressure below a sphere and a cylinder."""
-    for body, case in (("sphere", hertz), ("cylinder", cylinder)):
-        errors = []
-        for n in counts:
-            found = case.on_plane(ask, n, Pose())
-            errors.append(next((f.value for f in found if f.name == hertz.OVERALL), np.nan))
-        label = f"A8 {body} on plane, N = {', '.join(map(str, counts))}"
-        yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)
+        watch(sim, SLIDES)
+        places.append(friction.centre(sim)[0, :1])
+    yield in_steps("A8 sliding block", "order of the place in dt", places)
 
 
 def resting(ask: Ask) -> Iterator[Figure]:
@@ -106,20 +96,20 @@ def resting(ask: Ask) -> Iterator[Figure]:
 
     It starts at rest with a part of its weight; velocities count by length over wave speed.
     """
-    at_rest = settled(ask, DIP).positions()
-    rate = 10.0 * REST.c / REST.length
+    fps = step_rate(REST.length / LAYERS, REST.c)
+    at_rest = wc.Simulation(standing(DIP), ask.respond(ON_PLANE), fps)
+    omega = 0.5 * np.pi * REST.c / REST.length
+    for _ in relax(at_rest, omega, round(14.0 / omega * fps)):
+        pass
     states = []
     for n in SUBSTEPS:
+        rate = 10.0 * REST.c / REST.length
         sim = wc.Simulation(standing(1.0), ask.respond(ON_PLANE), rate, substeps=n)
-        sim.state.x.assign(at_rest)
-        for _ in sim.frames(WAIT):
-            pass
+        sim.state.x.assign(at_rest.positions())
+        watch(sim, WAIT / rate)
         v = sim.velocities() * REST.length / REST.c
         states.append(np.concatenate([sim.positions(), v]).astype(float))
-    errors = [np.linalg.norm(b - a) for a, b in pairwise(states)]
-    label = f"A8 resting bar, {', '.join(map(str, SUBSTEPS))} steps a frame"
-    sizes = 1.0 / np.array(SUBSTEPS[:-1])
-    yield order(label, "order of the state in dt", sizes, errors, SMOOTH)
+    yield in_steps("A8 resting bar", "order of the state in dt", states)
 
 
 def standing(part: float) -> wc.Scene:
@@ -132,14 +122,15 @@ def standing(part: float) -> wc.Scene:
     return scene
 
 
-def settled(ask: Ask, part: float) -> wc.Simulation:
-    """The bar at rest under a part of gravity."""
-    fps = step_rate(REST.length / LAYERS, REST.c)
-    sim = wc.Simulation(standing(part), ask.respond(ON_PLANE), fps)
-    omega = 0.5 * np.pi * REST.c / REST.length
-    for _ in relax(sim, omega, round(14.0 / omega * fps)):
-        pass
-    return sim
+def pressure(ask: Ask, counts) -> Iterator[Figure]:
+    """L2 error of the pressure below a sphere and a cylinder."""
+    for body, case in (("sphere", hertz), ("cylinder", cylinder)):
+        errors = []
+        for n in counts:
+            found = case.on_plane(ask, n, ALIGNED)
+            errors.append(next((f.value for f in found if f.name == hertz.OVERALL), np.nan))
+        label = f"A8 {body} on plane, N = {', '.join(map(str, counts))}"
+        yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)
 
 
 def shape(ask: Ask, across: float) -> Iterator[Figure]:
@@ -147,17 +138,14 @@ def shape(ask: Ask, across: float) -> Iterator[Figure]:
 
     ``across`` elements are in the contact of the first.
     """
-    a = hertz.contact_radius(hertz.LOADS[1], hertz.RADIUS, hertz.modulus(hertz.YOUNG))
-    found = []
+    depth, found = hertz.CONTACT**2 / hertz.RADIUS, []
     for rings in RINGS:
-        n = across * rings / RINGS[0]
-        sim, _ = hertz.press(ask, n, a**2 / hertz.RADIUS, a, Pose(), rings)
-        rest = sim.scene.bodies[0].x
+        sim, _ = hertz.press(ask, across * rings / RINGS[0], depth, ALIGNED, rings)
+        start = sim.scene.bodies[0].x
         if not found:
-            first, weight = rest, sim.model.mass.numpy().astype(float)
-        apart = np.linalg.norm(first[:, None] - rest, axis=2)
-        at = apart.argmin(axis=1)
-        found.append((sim.positions().astype(float) - rest)[at])
+            first, weight = start, masses(sim)
+        at = np.linalg.norm(first[:, None] - start, axis=2).argmin(axis=1)
+        found.append((sim.positions().astype(float) - start)[at])
     errors = [np.sqrt(weight @ ((v - u) ** 2).sum(axis=1)) for u, v in pairwise(found)]
     label = f"A8 sphere on plane, {', '.join(map(str, RINGS))} rings"
     yield order(label, "order of the displacement, L2", 1.0 / np.array(RINGS[:-1]), errors, SHAPE)

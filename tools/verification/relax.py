@@ -7,6 +7,8 @@ Euler lag by h/2, so what is scaled is v + h/2 f/m; scaling v itself would feed 
 of more steps would see modes of a whole number of half periods always at rest and never damp them.
 """
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import warp as wp
 
@@ -14,6 +16,7 @@ import warp_contact as wc
 from warp_contact import forces
 
 ZETA = 0.7  # of the slowest mode: the fastest decay without a long tail
+SAMPLE = 0.2  # part of the frames at the end that is averaged
 
 
 def step_rate(edge: float, speed: float) -> float:
@@ -26,7 +29,35 @@ def step_rate(edge: float, speed: float) -> float:
     return 3.0 * speed / edge
 
 
-def relax(sim: wc.Simulation, omega: float, frames: int):
+def rest(
+    sim: wc.Simulation,
+    omega: float,
+    lasts: float,
+    of: Callable = lambda: None,
+    part: float = SAMPLE,
+    least: int = 0,
+    calmed: bool = True,
+) -> np.ndarray:
+    """Let a scene come to rest and look at it at the end.
+
+    Args:
+        sim: at its start
+        omega: frequency of the slowest mode [1/s]
+        lasts: how long, of 1 / omega
+        of: what to take after each of the last frames
+        part: of the frames that are the last ones
+        least: number of frames
+        calmed: False where the material damps enough
+
+    Returns:
+        what ``of()`` was, shape (last frames, ...)
+    """
+    frames = max(least, int(np.ceil(lasts / omega * sim.fps)))
+    run = relax(sim, omega, frames) if calmed else sim.frames(frames)
+    return np.array([of() for frame in run if frame > (1.0 - part) * frames])
+
+
+def relax(sim: wc.Simulation, omega: float, frames: int) -> Iterator[int]:
     """Step ``frames`` frames, calm each, and yield its number; ``omega`` [1/s], slowest mode."""
     factor = float(np.exp(-2.0 * ZETA * omega / sim.fps))
     for frame in sim.frames(frames):

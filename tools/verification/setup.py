@@ -1,13 +1,13 @@
-"""What the cases share: what is asked of them, meshes, orientations, responses.
+"""What the cases share: what is asked of them, meshes, orientations, responses, samples of a run.
 
 A method that is right only for one mesh, or only along the axes, is not right: cases run on meshes
 that are structured, mirrored and jittered, and along the axes and turned.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from checks.collision import ANGLES, quaternion
 
 import warp_contact as wc
 from warp_contact.scene import rotation_matrix
@@ -15,6 +15,7 @@ from warp_contact.scene import rotation_matrix
 G = 9.81  # [m/s^2]
 MESHES = "structured", "mirrored", "jittered"
 JITTER = 0.15  # of a cell: largest shift of a vertex; no tet comes near to inverting
+ANGLES = 17.0, 31.0, 53.0  # of what is turned, about x, then y, then z [degrees]
 RESPONSES = "default", "literal", "penalty", "predicted"
 
 
@@ -63,6 +64,16 @@ class Pose:
         return np.asarray(world, dtype=float) @ self._r
 
 
+def quaternion(angles) -> np.ndarray:
+    """Rotations about x, then y, then z [degrees] as a quaternion (x, y, z, w)."""
+    (a, b, c), (d, e, f) = (g(np.radians(angles) / 2.0) for g in (np.cos, np.sin))
+    x, y = d * b * c - a * e * f, a * e * c + d * b * f
+    return np.array([x, y, a * b * f - d * e * c, a * b * c + d * e * f])
+
+
+ALIGNED = Pose()
+
+
 def block(size, cells, mesh: str = "structured", seed: int = 0) -> wc.TetMesh:
     """A block about the origin; its faces stay plane when its vertices are jittered."""
     regular = wc.box(size, cells, mirrored=mesh == "mirrored")
@@ -80,3 +91,29 @@ def on_face(mesh: wc.TetMesh, axis: int, side: int) -> np.ndarray:
     """Mask of the vertices on the face of a block at its lower (-1) or upper (1) end."""
     x = side * mesh.vertices[:, axis]
     return x > x.max() - 1e-6 * np.ptp(x)
+
+
+def watch(sim: wc.Simulation, seconds: float, of: Callable = lambda: None) -> np.ndarray:
+    """Step for some time [s]; what ``of()`` is after each frame, shape (frames, ...)."""
+    return np.array([of() for _ in sim.frames(round(seconds * sim.fps))])
+
+
+def forces(sim: wc.Simulation, *pairs: tuple[str, str]) -> np.ndarray:
+    """Contact forces [N] between pairs of labels, shape (pairs,)."""
+    found = sim.measure().forces
+    return np.array([found.get(pair, 0.0) for pair in pairs])
+
+
+def masses(sim: wc.Simulation, body: int | None = None) -> np.ndarray:
+    """Of the vertices of one body or of all [kg], in double precision."""
+    ends = sim.model.body_vert.numpy()
+    part = slice(None) if body is None else slice(*ends[body : body + 2])
+    return sim.model.mass.numpy()[part].astype(float)
+
+
+def vertex_areas(sim: wc.Simulation) -> np.ndarray:
+    """A third of the surface around each vertex [m^2], shape (n_vert,)."""
+    tris, x = sim.model.tris.numpy(), sim.positions().astype(float)
+    a, b, c = np.moveaxis(x[tris], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+    return np.bincount(tris.ravel(), np.repeat(area, 3), minlength=len(x))

@@ -13,20 +13,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from measure.figure import Figure, relative, zero
 
 import warp_contact as wc
-from verification import columns
-from verification.columns import Column
-from verification.figure import Figure, relative, zero
-from verification.relax import ZETA, relax, step_rate
-from verification.setup import MESHES, Ask, G, Pose
+from verification.columns import Column, Pile
+from verification.relax import ZETA, rest
+from verification.setup import ALIGNED, MESHES, Ask, G, Pose, forces
 
 # Good: the quantum of the paper's search, 2^-5 of the overlap. Excellent: half of what penalty
 # forces of 100 E / L leave. Best: float32.
 LIMITS = 0.031, 0.005, 1e-5
 SETTLE = 14.0  # 1 / (slowest frequency): exp(-0.7 * 14) = 6e-5 of the overlap remain
-SAMPLE = 0.2  # part of the frames at the end over which forces are averaged
 DAMPED = 0.35  # ratio of the slowest mode in the run with a damped material
+LAYERS = 8  # of cells along a column
 
 
 @dataclass(frozen=True)
@@ -41,14 +40,9 @@ class Case:
     density: float | None = None
 
     @property
-    def gravity(self) -> float:
-        """Downwards [m/s^2]."""
-        return G if self.density else 0.0
-
-    @property
     def sinks(self) -> tuple[float, float]:
         """By its own weight: the top of column 1, and the foot of the hanging column 2 [m]."""
-        weight = (self.density or 0.0) * self.gravity
+        weight = (self.density or 0.0) * G
         return 0.5 * weight * self.l1**2 / self.e1, 0.5 * weight * self.l2**2 / self.e2
 
     @property
@@ -82,26 +76,7 @@ def run(ask: Ask) -> Iterator[Figure]:
     for name, case in CASES.items():
         for across, mesh, turned in quick if ask.quick else full:
             yield from press(name, case, ask, across, mesh, Pose(turned))
-    yield from press("equal", CASES["equal"], ask, 6, "structured", Pose(), DAMPED)
-
-
-def pair(case: Case, across: int, mesh: str, seed: int) -> tuple[Column, Column]:
-    """Both columns."""
-    rho = case.density
-    lower = Column(
-        case.e1, case.l1, (1.0, 1.0), (4, 4, 8), rho or 1e-2 * case.e1, mesh=mesh, seed=seed
-    )
-    upper = Column(
-        case.e2,
-        case.l2,
-        (1.0, 1.0),
-        (across, across, 8),
-        rho or 1e-2 * case.e2,
-        0.0,
-        mesh,
-        seed + 1,
-    )
-    return lower, upper
+    yield from press("equal", CASES["equal"], ask, 6, "structured", ALIGNED, DAMPED)
 
 
 def press(
@@ -112,48 +87,34 @@ def press(
     ``damped``: of the slowest mode, by the material instead of by relaxation.
     """
     label = f"A1 {name} 4:{across} {mesh} {pose}{' damped' if damped else ''}"
-    lower, upper = pair(case, across, mesh, ask.seed)
-    speed = max(lower.wave_speed, upper.wave_speed)
-    omega = 0.5 * np.pi * min(lower.wave_speed / case.l1, upper.wave_speed / case.l2)
-    if damped:
-        beta = 2.0 * damped / omega
-        lower, upper = replace(lower, damping=beta), replace(upper, damping=beta)
-    scene = columns.build(lower, upper, case.overlap, pose, case.gravity)
-    # 100 E / L in all, split among the vertices of both faces.
-    stiffness = 100.0 * case.e1 / (case.l1 + case.l2) / (25 + (across + 1) ** 2)
-    cell = min(1.0 / across, case.l1 / 8, case.l2 / 8)
-    sim = wc.Simulation(scene, ask.respond(stiffness), fps=step_rate(cell, speed))
-    settle = SETTLE * (ZETA / damped if damped else 1.0) / omega
-    frames = int(np.ceil(settle * sim.fps))
-    forces = []
-    for frame in sim.frames(frames) if damped else relax(sim, omega, frames):
-        if frame > (1.0 - SAMPLE) * frames:
-            forces.append(sim.measure().forces.get(("lower", "upper"), 0.0))
-    yield from report(label, case, sim, pose, float(np.mean(forces)))
-
-
-def report(
-    label: str, case: Case, sim: wc.Simulation, pose: Pose, force: float
-) -> Iterator[Figure]:
-    """Pressure, both sides of the interface, what is left of the overlap, the stress."""
-    g = case.overlap
+    columns = []
+    for k, (young, length, n) in enumerate(((case.e1, case.l1, 4), (case.e2, case.l2, across))):
+        density = case.density or 1e-2 * young
+        columns.append(Column(young, length, density, (n, n, LAYERS), mesh=mesh, seed=ask.seed + k))
+    omega = min(c.slowest for c in columns)
+    columns = [replace(c, damping=2.0 * damped / omega) for c in columns]
+    gravity = G if case.density else 0.0
+    pile = Pile(columns, -case.overlap, clamped=True, pose=pose, gravity=gravity)
+    sim = pile.simulate(ask)
+    lasts = SETTLE * (ZETA / damped if damped else 1.0)
+    between = lambda: forces(sim, ("body0", "body1"))  # noqa: E731
+    force = rest(sim, omega, lasts, between, calmed=not damped).mean()
     yield relative(label, "contact force / section [Pa]", force, case.pressure, LIMITS)
-    for side, z in zip(("lower", "upper"), columns.faces(sim, pose), strict=True):
-        off = (z.mean() - case.interface) / g
+    g = case.overlap
+    for side, z in zip(("lower", "upper"), pile.faces(sim), strict=True):
+        off = float(z.mean() - case.interface) / g
         name = f"mean height of the {side} face [m]"
-        yield Figure(label, name, z.mean(), case.interface, off, LIMITS)
+        yield Figure(label, name, float(z.mean()), case.interface, off, LIMITS)
     yield zero(label, "deepest overlap [of that at the start]", sim.measure().overlap / g, LIMITS)
     if case.density is None:
-        body = sim.scene.bodies[0]
-        p = layer_means(body, columns.axial(sim, body, pose))
+        p = layer_means(sim.scene.bodies[0].mesh, pile.pressures(sim, sim.scene.bodies[0]))
         worst = p[np.abs(p - case.pressure).argmax()]
         yield relative(label, "stress of the worst layer [Pa]", worst, case.pressure, LIMITS)
 
 
-def layer_means(body, values: np.ndarray) -> np.ndarray:
-    """Means over the eight layers of tets of a column, weighted by volume."""
-    z = body.mesh.vertices[body.mesh.tets].mean(axis=1)[:, 2]
-    low, high = body.mesh.vertices[:, 2].min(), body.mesh.vertices[:, 2].max()
-    layer = np.clip(((z - low) / (high - low) * 8).astype(int), 0, 7)
-    w = body.mesh.volumes
-    return np.bincount(layer, w * values) / np.bincount(layer, w)
+def layer_means(mesh: wc.TetMesh, values: np.ndarray) -> np.ndarray:
+    """Means over the layers of tets of a column, weighted by volume."""
+    z = mesh.vertices[mesh.tets].mean(axis=1)[:, 2]
+    low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
+    layer = np.clip(((z - low) / (high - low) * LAYERS).astype(int), 0, LAYERS - 1)
+    return np.bincount(layer, mesh.volumes * values) / np.bincount(layer, mesh.volumes)

@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 import warp_contact as wc
-from warp_contact import forces
+from warp_contact.step import forces
 
 ZETA = 0.7  # of the slowest mode: the fastest decay without a long tail
 SAMPLE = 0.2  # part of the frames at the end that is averaged

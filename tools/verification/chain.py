@@ -15,7 +15,7 @@ import numpy as np
 
 import warp_contact as wc
 from verification.setup import on_face
-from warp_contact.scene import Body
+from warp_contact.scene.scene import Body
 
 
 def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> tuple[np.ndarray, ...]:

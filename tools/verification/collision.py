@@ -14,7 +14,7 @@ from measure.figure import Figure, zero
 
 import warp_contact as wc
 from verification.setup import ALIGNED, ANGLES, Ask, masses, quaternion
-from warp_contact.scene import rotation_matrix
+from warp_contact.scene.scene import rotation_matrix
 
 EDGE = 0.1  # of a block [m]
 YOUNG, POISSON, DENSITY = 5e4, 0.3, 1000.0  # [Pa], [-], [kg/m^3]

@@ -15,7 +15,7 @@ import numpy as np
 import warp_contact as wc
 from verification.relax import step_rate
 from verification.setup import ALIGNED, Ask, Pose, block, on_face
-from warp_contact.scene import Body
+from warp_contact.scene.scene import Body
 
 
 @dataclass(frozen=True)

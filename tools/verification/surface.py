@@ -14,9 +14,9 @@ from measure.figure import Figure, zero
 import warp_contact as wc
 from verification.heights import facing, height
 from verification.setup import Ask
-from warp_contact import candidates, solver, surface
-from warp_contact.types import Capacity
-from warp_contact.work import Work, allocate_work
+from warp_contact.data.contacts import Capacity
+from warp_contact.data.work import Work, allocate_work
+from warp_contact.step import broad_phase, step, surface
 
 EDGE = 0.1  # of a block [m]
 YOUNG, DENSITY = 5e4, 1000.0  # of the lower block [Pa], [kg/m^3]
@@ -98,19 +98,19 @@ def settle(sim: wc.Simulation, work: Work) -> int:
     """Let stage 4 move the surfaces until nothing is left; return how often it was called."""
     model, state = sim.model, sim.state
     for call in range(CALLS):
-        candidates.refresh(model, state.x, state.x, work)
+        broad_phase.refresh(model, state.x, state.x, work)
         edges = sim.response.search == "balanced"
-        solver.contacts(model, state.x, state.x, work, fresh=False, edges=edges)
+        step.contacts(model, state.x, state.x, work, fresh=False, edges=edges)
         surface.leftover(model, state.x, work)
         if not work.found.numpy()[0]:
             return call
-        solver.move_surfaces(model, state, work, sim.response, search=True)
+        step.move_surfaces(model, state, work, sim.response, search=True)
     return CALLS
 
 
 def first_speed(sim: wc.Simulation, work: Work) -> float:
     """Largest speed [m/s] after one full step from rest; the rest shapes carry no force."""
-    solver.step(sim.model, sim.state, work, sim.response, stages=0, search=True, unit=1.0)
+    step.step(sim.model, sim.state, work, sim.response, stages=0, search=True, unit=1.0)
     return float(np.linalg.norm(sim.velocities(), axis=1).max())
 
 

@@ -19,23 +19,23 @@ from measure.figure import Figure, lowest
 from measure.run import one_of, run, status
 from verification.setup import RESPONSES, Ask
 
-CASES = {
-    "springs": "A1 series springs",
-    "stack": "A1 stack of cubes",
-    "collision": "A6 free collision",
-    "weight": "A7 static weight",
-    "ladder": "A7m mass ladder",
-    "friction": "A5 Coulomb friction",
-    "bars": "A4 impact of bars",
-    "patch": "A2 contact patch test",
-    "hertz": "A3 Hertz, spheres",
-    "cylinder": "A3 Hertz, cylinder",
-    "facets": "A9 sliding over facets",
-    "orders": "A8 orders of convergence",
-    "surface": "stage 4 alone",
-    "energy": "damping",
-    "scenes": "scenes of the paper",
-    "bowl": "bowl of fruit",
+CASES = {  # title, where the figures come from
+    "springs": ("A1 series springs", "springs.run"),
+    "stack": ("A1 stack of cubes", "springs.stack"),
+    "collision": ("A6 free collision", "collision.run"),
+    "weight": ("A7 static weight", "weight.run"),
+    "ladder": ("A7m mass ladder", "weight.ladder"),
+    "friction": ("A5 Coulomb friction", "friction.run"),
+    "bars": ("A4 impact of bars", "bars.run"),
+    "patch": ("A2 contact patch test", "patch.run"),
+    "hertz": ("A3 Hertz, spheres", "hertz.run"),
+    "cylinder": ("A3 Hertz, cylinder", "hertz.cylinder"),
+    "facets": ("A9 sliding over facets", "facets.run"),
+    "orders": ("A8 orders of convergence", "orders.run"),
+    "surface": ("stage 4 alone", "surface.run"),
+    "energy": ("damping", "energy.run"),
+    "scenes": ("scenes of the paper", "scenes.run"),
+    "bowl": ("bowl of fruit", "scenes.bowl"),
 }
 
 
@@ -56,17 +56,19 @@ def main() -> int:
     wp.config.log_level = wp.LOG_WARNING
     print(machine.line(), f"response {args.response}, SEED={args.seed}", "", sep="\n")
     print(report.FIGURES.head())
+    chosen = [CASES[name] for name in args.cases or CASES]
     ask = Ask(args.quick, args.response, args.seed)
-    found = run({CASES[name]: partial(figures, name, ask) for name in args.cases or CASES})
+    found = run({title: partial(figures, where, ask) for title, where in chosen})
     print("", *(f"{title}: {lowest(kept)}" for title, kept in found.items()), sep="\n")
     if args.csv:
         report.write(args.csv, [figure for kept in found.values() for figure in kept])
     return status(found)
 
 
-def figures(name: str, ask: Ask) -> Iterator[Figure]:
-    """Those of a case; only those that are asked for are imported."""
-    return import_module(f"verification.{name}").run(ask)
+def figures(where: str, ask: Ask) -> Iterator[Figure]:
+    """Those of a case; only the files of cases that are asked for are imported."""
+    file, function = where.split(".")
+    return getattr(import_module(f"verification.{file}"), function)(ask)
 
 
 if __name__ == "__main__":

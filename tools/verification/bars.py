@@ -22,7 +22,7 @@ from measure.figure import Figure, relative, rms, zero
 
 import warp_contact as wc
 from verification import chain
-from verification.setup import Ask, masses
+from verification.setup import Ask, masses, watch
 
 FRAMES = 80  # in the time that a wave takes there and back
 GAP = 0.05  # at the start, of what the bars travel in that time
@@ -47,36 +47,25 @@ class Bar:
     speed: float
 
     @property
-    def c(self) -> float:
-        """Wave speed [m/s]."""
-        return float(np.sqrt(self.young / self.density))
-
-    @property
     def z(self) -> float:
         """Impedance [Pa s/m]."""
-        return self.density * self.c
+        return float(np.sqrt(self.young * self.density))
 
     @property
     def round_trip(self) -> float:
         """How long a wave takes there and back [s]."""
-        return 2.0 * self.length / self.c
+        return float(2.0 * self.length * np.sqrt(self.density / self.young))
 
 
 @dataclass(frozen=True)
 class Impact:
-    """What meets what, and what comes of it.
+    """What meets what, and what comes of it."""
 
-    Attributes:
-        bars: from below; a single one falls onto a wall
-        contact: how long they touch [s]
-        e: coefficient of restitution of the mean velocities
-        left: pressure just before they part, of the first; (z2 - z1) / (z2 + z1) for each time that
-            a wave came back through the upper bar until then
-    """
-
-    bars: tuple[Bar, ...]
-    contact: float
-    e: float
+    bars: tuple[Bar, ...]  # from below; a single one falls onto a wall
+    contact: float  # how long they touch [s]
+    e: float  # coefficient of restitution of the mean velocities
+    # Pressure just before they part, of the first: (z2 - z1) / (z2 + z1) for each time that a wave
+    # came back through the upper bar until then.
     left: float = 1.0
 
     @property
@@ -95,19 +84,9 @@ class Impact:
         return min(bar.round_trip for bar in self.bars)
 
     @property
-    def round_trip(self) -> float:
-        """Of a wave in the lower bar [s]."""
-        return self.bars[0].round_trip
-
-    @property
     def frame(self) -> float:
         """Duration of a frame [s]."""
-        return self.round_trip / FRAMES
-
-    @property
-    def touch(self) -> float:
-        """From the start until the rest shapes touch [s]."""
-        return GAP * self.plateau
+        return self.bars[0].round_trip / FRAMES
 
 
 FIRST, ROUND = Bar(1.0, 1e6, 1000.0, 0.1), 2.0 / np.sqrt(1e3)  # bar 1 of the pairs, its 2 L / c
@@ -140,8 +119,7 @@ def run(ask: Ask) -> Iterator[Figure]:
 
 def faster(impact: Impact) -> Impact:
     """The same at ``FASTER`` times the speed."""
-    bars = tuple(replace(bar, speed=FASTER * bar.speed) for bar in impact.bars)
-    return replace(impact, bars=bars)
+    return replace(impact, bars=tuple(replace(b, speed=FASTER * b.speed) for b in impact.bars))
 
 
 def build(impact: Impact, n: int, across: tuple[int, int]) -> tuple[wc.Scene, float]:
@@ -151,7 +129,7 @@ def build(impact: Impact, n: int, across: tuple[int, int]) -> tuple[wc.Scene, fl
     """
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
     width = impact.bars[0].length / n * across[0]
-    gap = impact.approach * impact.touch
+    gap = impact.approach * GAP * impact.plateau
     for k, bar in enumerate(impact.bars):
         cells = (across[k], across[k], round(bar.length / width * across[k]))
         mesh = wc.box((width, width, bar.length), cells)
@@ -166,21 +144,13 @@ def build(impact: Impact, n: int, across: tuple[int, int]) -> tuple[wc.Scene, fl
 
 @dataclass
 class History:
-    """What an impact showed.
+    """What an impact showed in each frame; time 0 is the moment at which the rest shapes touch."""
 
-    Attributes:
-        pressure: mean of each frame [Pa], shape (n,)
-        energy: of that at the start, shape (n,)
-        steps: of each frame, shape (n,)
-        e: coefficient of restitution
-        time: ends of the frames [s], shape (n,); 0 is the moment at which the rest shapes touch
-    """
-
-    pressure: np.ndarray
-    energy: np.ndarray
+    pressure: np.ndarray  # mean of the frame [Pa]
+    energy: np.ndarray  # at its end, of that at the start
     steps: np.ndarray
-    e: float
-    time: np.ndarray
+    time: np.ndarray  # its end [s]
+    e: float  # coefficient of restitution
 
 
 def record(impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)) -> History:
@@ -189,24 +159,24 @@ def record(impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)) -
     # A contact as stiff as an element of the bar, five times: a penalty that is not seen.
     respond = ask.respond(5.0 * impact.bars[0].young * width / across[0])
     sim = wc.Simulation(scene, respond, fps=1.0 / impact.frame)
-    energy = sim.measure().energy
-    last = impact.touch + impact.contact + AFTER * impact.round_trip
-    rows = []
-    for _ in sim.frames(int(np.ceil(last / impact.frame))):
+    energy, touch = sim.measure().energy, GAP * impact.plateau
+    last = touch + impact.contact + AFTER * impact.bars[0].round_trip
+
+    def look() -> tuple[float, ...]:
         now = sim.measure()
-        rows.append((sum(now.forces.values()) / width**2, now.energy / energy, sim.substeps))
-    pressure, energies, steps = np.array(rows).T
-    e = restitution(impact, scene, masses(sim), sim.velocities())
-    time = np.arange(1, len(rows) + 1) / sim.fps - impact.touch
-    return History(pressure, energies, steps.astype(int), e, time)
+        pressure = sum(now.forces.values()) / width**2
+        return pressure, now.energy / energy, sim.substeps, sim.time - touch
+
+    found = watch(sim, int(np.ceil(last / impact.frame)) * impact.frame, look).T
+    return History(*found, restitution(impact, scene, masses(sim), sim.velocities()))
 
 
 def exact(impact: Impact, n: int, across: tuple[int, int], found: History) -> History:
     """The same impact of two bars in exact contact on the same mesh, in as many steps."""
     scene, width = build(impact, n, across)
-    impulse, energy, mass, v = chain.collide(scene, impact.frame, found.steps.tolist())
-    e = restitution(impact, scene, mass, v)
-    return History(impulse / (impact.frame * width**2), energy, found.steps, e, found.time)
+    impulse, energy, mass, v = chain.collide(scene, impact.frame, found.steps.astype(int))
+    pressure, e = impulse / (impact.frame * width**2), restitution(impact, scene, mass, v)
+    return replace(found, pressure=pressure, energy=energy, e=e)
 
 
 def restitution(impact: Impact, scene: wc.Scene, mass: np.ndarray, v: np.ndarray) -> float:
@@ -233,23 +203,23 @@ def hit(
     label: str, impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)
 ) -> Iterator[Figure]:
     """Restitution, pressure, release and energies of an impact."""
-    found = record(impact, ask, n, across)
+    found, round_trip = record(impact, ask, n, across), impact.bars[0].round_trip
     yield relative(label, "restitution", found.e, impact.e, RESTITUTION)
     inner = (found.time > 0.15 * impact.plateau) & (found.time < 0.85 * impact.plateau)
     p = found.pressure[inner] / impact.pressure
     yield zero(label, "pressure, rms error of the middle 70 %", rms(p - 1.0), PLATEAU)
     yield relative(label, "pressure, mean of the middle 70 %", p.mean(), 1.0, PLATEAU)
     off = release(found, impact)
-    error = (off - impact.contact) / impact.round_trip
+    error = (off - impact.contact) / round_trip
     yield Figure(label, "end of the contact [s]", off, impact.contact, error, RELEASE)
     if impact.e < 1.0:
         there = release(exact(impact, n, across, found), impact)
-        error = (there - impact.contact) / impact.round_trip
+        error = (there - impact.contact) / round_trip
         name = "end, exact contact on the same mesh [s]"
         yield Figure(label, name, there, impact.contact, error)
-        apart = 100.0 * (off - there) / impact.round_trip
+        apart = 100.0 * (off - there) / round_trip
         yield Figure(label, "end, difference of both [% of 2 L / c]", apart)
-    later = found.time > impact.contact + 0.1 * impact.round_trip
+    later = found.time > impact.contact + 0.1 * round_trip
     after = found.pressure[later].max() / impact.pressure
     yield zero(label, "largest pressure afterwards [of the plateau]", after, SUCTION)
     left = found.energy[-1]

@@ -19,16 +19,10 @@ from warp_contact.scene.scene import Body
 
 
 def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> tuple[np.ndarray, ...]:
-    """Run two bars along z, the lower first and Poisson ratio 0, without gravity.
+    """Run two bars along z, the lower first, without gravity, in so many steps of each frame [s].
 
-    Args:
-        scene: the bars
-        frame: duration of a frame [s]
-        steps: of each frame
-
-    Returns:
-        impulses between the bars in each frame [N s]; the energy after each, of that at the start;
-        masses of the vertices [kg]; their velocities at the end [m/s], shape (n_vert, 3)
+    Returns the impulses between the bars in each frame [N s], the energy after it, of that at the
+    start, the masses of the vertices [kg] and their velocities at the end [m/s].
 
     Raises:
         ValueError: the vertices at the ends do not face each other

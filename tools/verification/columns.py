@@ -20,18 +20,7 @@ from warp_contact.scene.scene import Body
 
 @dataclass(frozen=True)
 class Column:
-    """One column.
-
-    Attributes:
-        young: [Pa]
-        length: [m]
-        density: [kg/m^3]
-        cells: shape (3,)
-        section: [m], shape (2,)
-        mesh: one of ``setup.MESHES``
-        seed: of the jittered mesh
-        damping: of the material [s]
-    """
+    """E [Pa], length [m], density [kg/m^3], cells, section [m], mesh with its seed, damping [s]."""
 
     young: float
     length: float
@@ -41,16 +30,6 @@ class Column:
     mesh: str = "structured"
     seed: int = 0
     damping: float = 0.0
-
-    @property
-    def rest(self) -> wc.TetMesh:
-        """Its mesh, about the origin."""
-        return block((*self.section, self.length), self.cells, self.mesh, self.seed)
-
-    @property
-    def material(self) -> wc.Corotated:
-        """Linear in the axial stretch."""
-        return wc.Corotated(self.young, 0.0, self.density, self.damping)
 
     @property
     def wave_speed(self) -> float:
@@ -65,16 +44,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Pile:
-    """Columns from below, the foot of the first held.
+    """Columns from below, from the height ``base`` [m], with a gap [m] or overlap (below 0).
 
-    Attributes:
-        columns: as named
-        gap: between the rest shapes [m], negative for an overlap
-        base: height of the foot [m]
-        clamped: whether the top of the last is held too
-        pose: of the whole
-        gravity: along -z [m/s^2]
-        friction: Coulomb's coefficient
+    The foot of the first is held, and the top of the last where the pile is clamped; gravity
+    [m/s^2] acts along -z.
     """
 
     columns: Sequence[Column]
@@ -88,12 +61,14 @@ class Pile:
     def build(self) -> wc.Scene:
         """The rest shapes."""
         scene = wc.Scene(self.pose.out((0.0, 0.0, -self.gravity)), self.friction)
-        foot, last = self.base, len(self.columns) - 1
-        for k, c in enumerate(self.columns):
-            rest, place = c.rest, self.pose.out((0.0, 0.0, foot + 0.5 * c.length))
-            held = on_face(rest, 2, -1) & (k == 0)
-            held |= on_face(rest, 2, 1) & (self.clamped and k == last)
-            scene.add_body(rest, c.material, place, self.pose.q, fixed=held)
+        foot = self.base
+        for c in self.columns:
+            mesh = block((*c.section, c.length), c.cells, c.mesh, c.seed)
+            held = on_face(mesh, 2, -1) & (c is self.columns[0])
+            held |= on_face(mesh, 2, 1) & (self.clamped and c is self.columns[-1])
+            material = wc.Corotated(c.young, 0.0, c.density, c.damping)
+            place = self.pose.out((0.0, 0.0, foot + 0.5 * c.length))
+            scene.add_body(mesh, material, place, self.pose.q, fixed=held)
             foot += c.length + self.gap
         return scene
 
@@ -129,11 +104,10 @@ class Pile:
         sim.state.x.assign(np.concatenate(self.static(sim.scene, load)).astype(np.float32))
         return sim
 
-    def faces(self, sim: wc.Simulation) -> tuple[np.ndarray, np.ndarray]:
-        """Heights z [m] of the vertices of the upper face of the first column and the one above."""
-        first, second = sim.scene.bodies[:2]
-        top = self.pose.back(sim.positions(first))[on_face(first.mesh, 2, 1), 2]
-        return top, self.pose.back(sim.positions(second))[on_face(second.mesh, 2, -1), 2]
+    def face(self, sim: wc.Simulation, k: int, side: int) -> np.ndarray:
+        """Heights z [m] of the vertices at the lower (-1) or upper (1) end of column ``k``."""
+        body = sim.scene.bodies[k]
+        return self.pose.back(sim.positions(body))[on_face(body.mesh, 2, side), 2]
 
     def pressures(self, sim: wc.Simulation, *bodies: Body) -> np.ndarray:
         """Axial stress of each tet of some columns [Pa], pressure counted positive."""
@@ -143,11 +117,10 @@ class Pile:
 
 def stress(body: Body, x: np.ndarray) -> np.ndarray:
     """P [Pa] of each tet at ``x`` [m], in the axes of the mesh; in doubles, shape (m, 3, 3)."""
-    tets = body.mesh.tets
-    f = _edges(x[tets]) @ np.linalg.inv(_edges(body.mesh.vertices[tets]))
+    at, rest = (
+        np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2).astype(float)
+        for corners in (x[body.mesh.tets], body.mesh.vertices[body.mesh.tets])
+    )
+    f = at @ np.linalg.inv(rest)
     u, _, vt = np.linalg.svd(f)
     return body.material.youngs_modulus * (f - u @ vt)
-
-
-def _edges(corners: np.ndarray) -> np.ndarray:
-    return np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2).astype(float)

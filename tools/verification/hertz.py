@@ -1,15 +1,20 @@
-"""A3: Hertz: a sphere pressed onto a rigid plane and onto another sphere.
+"""A3: Hertz: a sphere pressed onto a plane and onto another one, a long cylinder onto a plane.
 
     a = (3 F R / 4 E*)^(1/3),  d = a^2 / R,  p0 = 3 F / 2 pi a^2,  p = p0 sqrt(1 - r^2 / a^2)
-    1 / E* = sum (1 - nu^2) / E,  1 / R = sum 1 / R_i
+    b = sqrt(4 F' R / pi E*),  p0 = sqrt(F' E* / pi R),  p = p0 sqrt(1 - x^2 / b^2)
+    1 / E* = sum (1 - nu^2) / E,  1 / R = sum 1 / R_i,  F' the force per length of line
 
-(Hertz 1882; Johnson 1985, Contact Mechanics, ch. 4.) The body is the lower part of a ball of radius
-R, held at a plane above, with N elements across the radius of contact a. Pressures are compared at
+(Hertz 1882; Johnson 1985, Contact Mechanics, ch. 4.) The body is the lower part of a ball or of a
+slice of a cylinder, held at a plane above, with N elements across a or b. Pressures are compared at
 the force that is measured, so that the distance of the held plane, some 7 a, enters to the third
-order only. The second moment of p gives a^2 = 5 / 2 sum F_i r_i^2 / F.
+order only. The second moment of p gives a^2 = 5 / 2 sum F_i r_i^2 / F, b^2 = 4 sum F_i x_i^2 / F.
+
+The Poisson ratio of the slice is 0, so that plane strain needs no force on its ends and is exact
+with the ends free; its modulus is the E* of a ratio of 0.3, which is all that the pressures see.
+They are those of rows of vertices along the line: force over the width of a row.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from measure.figure import Figure, relative, zero
@@ -25,6 +30,11 @@ LOADS = 5.0, 10.0, 20.0  # of the depths that are imposed [N]
 COUNTS = 1, 2, 4  # N
 RINGS = {1: 6, 2: 8, 4: 12}  # of the mesh, for each N; 3/4 as many layers
 SETTLE = 8.0  # 1 / (slowest frequency)
+LINE_LOAD = 100.0  # about F' [N/m]
+SLICE_WIDTH, SLICE_HEIGHT = 0.06, 0.08  # half the width and the height of the slice [m]
+ACROSS = 2  # cells along the line
+COLUMNS = {1: 8, 2: 10, 4: 14}  # from the middle to a side, for each N; as many layers
+FIT = 0.92  # of b: the N elements end there
 PAIRS = {  # case: (radii [m], the first RADIUS, moduli [Pa], force [N])
     "two equal spheres": ((RADIUS, 0.1), (1e6, 1e6), 5.0),
     "soft on stiff sphere": ((RADIUS, 0.2), (1e6, 1e7), 5.0),
@@ -48,7 +58,20 @@ def contact_radius(force: float, radius: float, e_star: float) -> float:
     return float(np.cbrt(0.75 * force * radius / e_star))
 
 
+def ball_contact(force: float, radius: float, e_star: float) -> tuple[float, float]:
+    """Exact a [m] and p0 [Pa]."""
+    a = contact_radius(force, radius, e_star)
+    return a, 1.5 * force / (np.pi * a**2)
+
+
+def line_contact(load: float, radius: float, e_star: float) -> tuple[float, float]:
+    """Exact b [m] and p0 [Pa] at the force per length ``load`` [N/m]."""
+    b = np.sqrt(4.0 * load * radius / (np.pi * e_star))
+    return float(b), float(np.sqrt(load * e_star / (np.pi * radius)))
+
+
 CONTACT = contact_radius(LOADS[1], RADIUS, modulus(YOUNG))  # a that the meshes are made for [m]
+E_STAR, ORIGIN = modulus(YOUNG), (0.0, 0.0, 0.0)  # [Pa], [m]
 
 
 def run(ask: Ask) -> Iterator[Figure]:
@@ -89,19 +112,27 @@ def pressure_wave(young: float, poisson: float = POISSON) -> float:
     return float(np.sqrt(stiff / DENSITY))
 
 
-def hold(scene: wc.Scene, mesh: wc.TetMesh, material, q, place=(0.0, 0.0, 0.0)) -> None:
-    """Add a body that is held at its plane above."""
-    z = mesh.vertices[:, 2]
-    scene.add_body(mesh, material, place, q, fixed=z > 0.999 * z.max())
-
-
-def settle(
-    ask: Ask, scene: wc.Scene, size: float, young=YOUNG, poisson=POISSON, height=HEIGHT
+def squeeze(
+    ask: Ask, bodies: list[tuple], size: float, depth: float | None = None, pose: Pose = ALIGNED
 ) -> tuple[wc.Simulation, np.ndarray]:
-    """A scene of elements of ``size`` [m] at rest, and mean pressures of its vertices [Pa]."""
-    speed = pressure_wave(young, poisson)
+    """Bodies held at their planes above, at rest, and mean pressures of their vertices [Pa].
+
+    Each is a mesh with elements of ``size`` [m], a material, its place and rotation; with a depth
+    [m] there is a plane below.
+    """
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
+    if depth is not None:
+        scene.add_plane(pose.out((0.0, 0.0, 1.0)), depth)
+    for mesh, material, place, q in bodies:
+        z = mesh.vertices[:, 2]
+        scene.add_body(mesh, material, place, q, fixed=z > 0.999 * z.max())
+    mesh, material = bodies[0][:2]
+    young, speed = (
+        material.youngs_modulus,
+        pressure_wave(material.youngs_modulus, material.poisson_ratio),
+    )
     sim = wc.Simulation(scene, ask.respond(100.0 * young * size), fps=step_rate(size, speed))
-    omega = 0.5 * np.pi * speed / height
+    omega = 0.5 * np.pi * speed / mesh.vertices[:, 2].max()
     p = rest(sim, omega, SETTLE, lambda: sim.contact_fields()["pressure"].astype(float))
     return sim, p.mean(axis=0)
 
@@ -110,11 +141,8 @@ def press(
     ask: Ask, n: float, depth: float, pose: Pose, rings: int | None = None
 ) -> tuple[wc.Simulation, np.ndarray]:
     """Press a sphere onto a plane by ``depth`` [m]."""
-    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
-    scene.add_plane(pose.out((0.0, 0.0, 1.0)), depth)
-    mesh = cap(RADIUS, CONTACT / n, rings or RINGS[n])
-    hold(scene, mesh, wc.Corotated(YOUNG, POISSON, DENSITY), pose.q)
-    return settle(ask, scene, CONTACT / n)
+    ball = cap(RADIUS, CONTACT / n, rings or RINGS[n]), wc.Corotated(YOUNG, POISSON, DENSITY)
+    return squeeze(ask, [(*ball, ORIGIN, pose.q)], CONTACT / n, depth, pose)
 
 
 def on_plane(ask: Ask, n: int, pose: Pose) -> Iterator[Figure]:
@@ -127,29 +155,26 @@ def on_plane(ask: Ask, n: int, pose: Pose) -> Iterator[Figure]:
 def below(
     label: str, sim: wc.Simulation, p: np.ndarray, radius: float, e_star: float, n: int, pose: Pose
 ) -> Iterator[Figure]:
-    """The pressures below the first sphere against those of Hertz at the same force."""
-
-    def exact(force: float) -> tuple[float, float]:
-        a = contact_radius(force, radius, e_star)
-        return a, 1.5 * force / (np.pi * a**2)
-
+    """The pressures below the first sphere, at the vertices of its lower side."""
     body = sim.scene.bodies[0]
     under = np.flatnonzero(on_ball(body))
     r = np.linalg.norm(pose.back(sim.positions(body)[under])[:, :2], axis=1)
     found = r, p[under], vertex_areas(sim)[under]
-    yield from profile(label, ("force [N]", "radius"), found, exact, 2.5, n)
+    yield from profile(
+        label, ("force [N]", "radius"), found, (ball_contact, radius, e_star), 2.5, n
+    )
 
 
 def profile(
-    label: str, names: tuple[str, str], found: tuple, exact: Callable, moment: float, n: int
+    label: str, names: tuple[str, str], found: tuple, exact: tuple, moment: float, n: int
 ) -> Iterator[Figure]:
-    """Pressures against p0 sqrt(1 - r^2 / a^2).
+    """Pressures against p0 sqrt(1 - r^2 / a^2) at the same force.
 
     Args:
         label: of the case
         names: of the force and of a
         found: places r [m], pressures there [Pa], and how much of the surface each is for
-        exact: a [m] and p0 [Pa] at a force
+        exact: what gives a [m] and p0 [Pa] at a force, the radius [m], E* [Pa]
         moment: a^2 over the second moment of p
         n: elements across a
     """
@@ -159,7 +184,7 @@ def profile(
     yield Figure(label, names[0], force, limits=() if pressed else RADIUS_LIMITS)
     if not pressed:
         return
-    a, p0 = exact(force)
+    a, p0 = exact[0](force, *exact[1:])
     radius = np.sqrt(moment * (p * area) @ r**2 / force)
     yield relative(label, f"{names[1]} from the second moment [m]", radius, a, RADIUS_LIMITS)
     middle = p[np.abs(r).argmin()]
@@ -194,11 +219,55 @@ def on_sphere(ask: Ask, name: str, n: int) -> Iterator[Figure]:
     radii, youngs, load = PAIRS[name]
     e_star, radius = modulus(*youngs), 1.0 / sum(1.0 / r for r in radii)
     a = contact_radius(load, radius, e_star)
-    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
     half = np.radians(20.0) / 2.0  # the lower one upside down, turned by 20 degrees
-    for k, q in enumerate((ALIGNED.q, (np.cos(half), np.sin(half), 0.0, 0.0))):
+    turns = ALIGNED.q, (np.cos(half), np.sin(half), 0.0, 0.0)
+    bodies = []
+    for k, (own, young) in enumerate(zip(radii, youngs, strict=True)):
         # The stiffer one denser, for the same step.
-        material = wc.Corotated(youngs[k], POISSON, DENSITY * youngs[k] / YOUNG)
-        hold(scene, cap(radii[k], a / n, RINGS[n]), material, q, (0.0, 0.0, k * a**2 / radius))
-    sim, p = settle(ask, scene, a / n)
+        material = wc.Corotated(young, POISSON, DENSITY * young / YOUNG)
+        place = (0.0, 0.0, k * a**2 / radius)
+        bodies.append((cap(own, a / n, RINGS[n]), material, place, turns[k]))
+    sim, p = squeeze(ask, bodies, a / n)
     yield from below(f"A3 {name}, N = {n}", sim, p, radius, e_star, n, ALIGNED)
+
+
+def cylinder(ask: Ask) -> Iterator[Figure]:
+    """1, 2 and 4 elements across; quick leaves 4 and the turned ones out."""
+    for n in COUNTS[: 2 if ask.quick else None]:
+        for turned in (False,) if ask.quick else (False, True):
+            yield from line_on_plane(ask, n, Pose(turned))
+
+
+def slab(size: float, columns: int) -> wc.TetMesh:
+    """The slice about its lowest line, the y axis, with elements of ``size`` [m] there."""
+    box = wc.box((2.0, ACROSS * size, 1.0), (2 * columns, ACROSS, columns))
+    s, y, t = box.vertices.T
+    x = SLICE_WIDTH * np.sign(s) * graded(np.abs(s), size / SLICE_WIDTH * columns)
+    low = RADIUS - np.sqrt(RADIUS**2 - x**2)
+    z = low + (SLICE_HEIGHT - low) * graded(t + 0.5, size / SLICE_HEIGHT * columns)
+    return wc.TetMesh(np.stack([x, y, z], axis=1), box.tets)
+
+
+def line_on_plane(ask: Ask, n: int, pose: Pose) -> Iterator[Figure]:
+    """Force, half-width, peak and profile of the pressure."""
+    b, _ = line_contact(LINE_LOAD, RADIUS, E_STAR)
+    # About the force asked for (Johnson 1985, sec. 5.6, nu = 0).
+    depth = LINE_LOAD / (np.pi * E_STAR) * 2.0 * np.log(2.0 * SLICE_HEIGHT / b)
+    mesh, material = slab(FIT * b / n, COLUMNS[n]), wc.Corotated(E_STAR, 0.0, DENSITY)
+    sim, p = squeeze(ask, [(mesh, material, ORIGIN, pose.q)], FIT * b / n, depth, pose)
+    rows = by_row(mesh, p * vertex_areas(sim), pose.back(sim.positions())[:, 0])
+    label, names = f"A3 cylinder on plane, N = {n} {pose}", ("force [N/m]", "half-width")
+    yield from profile(label, names, rows, (line_contact, RADIUS, E_STAR), 4.0, n)
+
+
+def by_row(mesh: wc.TetMesh, force: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Places [m], pressures [Pa] and widths [m] of the rows of vertices along the line.
+
+    ``force`` [N] and ``at`` [m] are of each vertex: its force, its place across the line.
+    """
+    rest, row = np.unique(np.round(mesh.vertices[:, 0], 9), return_inverse=True)
+    per_row = np.bincount(row, force)
+    x = np.bincount(row, at * force, len(rest)) / np.maximum(per_row, 1e-30)
+    x = np.where(per_row > 0.0, x, rest)
+    width = np.gradient(x)
+    return x, per_row / np.ptp(mesh.vertices[:, 1]) / width, width

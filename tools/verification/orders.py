@@ -19,7 +19,7 @@ import numpy as np
 from measure.figure import Figure
 
 import warp_contact as wc
-from verification import bars, cylinder, friction, hertz
+from verification import bars, friction, hertz
 from verification.relax import relax, step_rate
 from verification.setup import ALIGNED, Ask, G, masses, watch
 
@@ -35,8 +35,9 @@ SMOOTH = 1.0, (0.1, 0.05, 0.01)
 PRESSURE = 1.0, (0.6, 0.2, 0.0)
 SHAPE = 2.0, (1.0, 0.2, 0.0)
 
-REST, LAYERS = bars.Bar(1.0, 1e5, 1000.0, 0.0), 10  # the bar that rests, its cells
-ON_PLANE = 5.0 * REST.young * REST.length / LAYERS  # of a penalty [N/m]
+LENGTH, YOUNG, DENSITY, LAYERS = 1.0, 1e5, 1000.0, 10  # of the bar that rests, and its cells
+WAVE = float(np.sqrt(YOUNG / DENSITY))  # speed in it [m/s]
+ON_PLANE = 5.0 * YOUNG * LENGTH / LAYERS  # of a penalty [N/m]
 DIP, WAIT = 0.3, 10  # start, of the weight; until [frames]: L / c, a quarter of a period
 RINGS = 4, 8, 16  # of nested meshes, 1, 2 and 4 elements across the contact
 
@@ -96,18 +97,18 @@ def resting(ask: Ask) -> Iterator[Figure]:
 
     It starts at rest with a part of its weight; velocities count by length over wave speed.
     """
-    fps = step_rate(REST.length / LAYERS, REST.c)
+    fps = step_rate(LENGTH / LAYERS, WAVE)
     at_rest = wc.Simulation(standing(DIP), ask.respond(ON_PLANE), fps)
-    omega = 0.5 * np.pi * REST.c / REST.length
+    omega = 0.5 * np.pi * WAVE / LENGTH
     for _ in relax(at_rest, omega, round(14.0 / omega * fps)):
         pass
     states = []
     for n in SUBSTEPS:
-        rate = 10.0 * REST.c / REST.length
+        rate = 10.0 * WAVE / LENGTH
         sim = wc.Simulation(standing(1.0), ask.respond(ON_PLANE), rate, substeps=n)
         sim.state.x.assign(at_rest.positions())
         watch(sim, WAIT / rate)
-        v = sim.velocities() * REST.length / REST.c
+        v = sim.velocities() * LENGTH / WAVE
         states.append(np.concatenate([sim.positions(), v]).astype(float))
     yield in_steps("A8 resting bar", "order of the state in dt", states)
 
@@ -116,18 +117,18 @@ def standing(part: float) -> wc.Scene:
     """The bar on a plane under a part of gravity."""
     scene = wc.Scene(gravity=(0.0, 0.0, -part * G), friction=0.0)
     scene.add_plane((0.0, 0.0, 1.0), 0.0)
-    width = REST.length / LAYERS
-    mesh = wc.box((width, width, REST.length), (1, 1, LAYERS))
-    scene.add_body(mesh, wc.Corotated(REST.young, 0.0, REST.density), (0, 0, 0.5 * REST.length))
+    width = LENGTH / LAYERS
+    mesh = wc.box((width, width, LENGTH), (1, 1, LAYERS))
+    scene.add_body(mesh, wc.Corotated(YOUNG, 0.0, DENSITY), (0, 0, 0.5 * LENGTH))
     return scene
 
 
 def pressure(ask: Ask, counts) -> Iterator[Figure]:
     """L2 error of the pressure below a sphere and a cylinder."""
-    for body, case in (("sphere", hertz), ("cylinder", cylinder)):
+    for body, case in (("sphere", hertz.on_plane), ("cylinder", hertz.line_on_plane)):
         errors = []
         for n in counts:
-            found = case.on_plane(ask, n, ALIGNED)
+            found = case(ask, n, ALIGNED)
             errors.append(next((f.value for f in found if f.name == hertz.OVERALL), np.nan))
         label = f"A8 {body} on plane, N = {', '.join(map(str, counts))}"
         yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)

@@ -45,11 +45,10 @@ def run(ask: Ask) -> Iterator[Figure]:
 def pair(cells: tuple[int, int], slab: bool, pose: Pose, mesh="structured", seed: int = 0) -> Pile:
     """Both blocks, in about cubic cells; slabs one cell thick."""
     section = 1.0, THICK if slab else 1.0
-    counts = [(n, 1 if slab else n, max(1, round(HEIGHT * n))) for n in cells]
-    blocks = [
-        Column(YOUNG, HEIGHT, DENSITY, count, section, mesh, seed + k)
-        for k, count in enumerate(counts)
-    ]
+    blocks = []
+    for k, n in enumerate(cells):
+        count = n, 1 if slab else n, max(1, round(HEIGHT * n))
+        blocks.append(Column(YOUNG, HEIGHT, DENSITY, count, section, mesh, seed + k))
     return Pile(blocks, -PUSH, clamped=True, pose=pose)
 
 
@@ -63,19 +62,17 @@ def press(
     bodies = sim.scene.bodies
 
     def look() -> np.ndarray:
-        between = forces(sim, ("body0", "body1"))
-        return np.concatenate([between, pile.pressures(sim, *bodies)])
+        return np.append(pile.pressures(sim, *bodies), forces(sim, ("body0", "body1")))
 
-    force, *stress = rest(sim, pile.columns[0].slowest, SETTLE, look).mean(axis=0)
-    error = np.array(stress) / EXACT - 1.0
-    area = THICK if slab else 1.0
-    yield relative(label, "contact force / section [Pa]", force / area, EXACT, FORCE)
+    *stress, force = rest(sim, pile.columns[0].slowest, SETTLE, look).mean(axis=0)
+    error = np.abs(np.array(stress) / EXACT - 1.0)
+    force /= THICK if slab else 1.0
+    yield relative(label, "contact force / section [Pa]", force, EXACT, FORCE)
     yield zero(label, "stress of the tets, rms error", rms(error), RMS)
-    yield zero(label, "stress of the tets, largest error", np.abs(error).max(), MAX)
+    yield zero(label, "stress of the tets, largest error", error.max(), MAX)
     inner = np.concatenate([away_from_rim(body.mesh) for body in bodies])
     if inner.any():
-        name = "the same away from the rims of the faces"
-        yield zero(label, name, np.abs(error[inner]).max())
+        yield zero(label, "the same away from the rims of the faces", error[inner].max())
     yield zero(label, "deepest overlap [of the push]", sim.measure().overlap / PUSH)
 
 

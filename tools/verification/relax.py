@@ -16,15 +16,12 @@ import warp_contact as wc
 from warp_contact.step import forces
 
 ZETA = 0.7  # of the slowest mode: the fastest decay without a long tail
-SAMPLE = 0.2  # part of the frames at the end that is averaged
 
 
 def step_rate(edge: float, speed: float) -> float:
-    """Frames per second [1/s] of about one stable step.
+    """Frames per second [1/s] of about one stable step, for the shortest edge of a cell [m].
 
-    Args:
-        edge: shortest edge of a cell [m]
-        speed: of the waves [m/s]; the tets of a cell have modes of some 3.5 speed / edge
+    The tets of a cell have modes of some 3.5 speed / edge, with the speed of the waves [m/s].
     """
     return 3.0 * speed / edge
 
@@ -33,24 +30,15 @@ def rest(
     sim: wc.Simulation,
     omega: float,
     lasts: float,
-    of: Callable = lambda: None,
-    part: float = SAMPLE,
+    of: Callable,
+    part: float = 0.2,
     least: int = 0,
     calmed: bool = True,
 ) -> np.ndarray:
-    """Let a scene come to rest and look at it at the end.
+    """Let a scene come to rest; what ``of()`` is after each of the last frames, shape (n, ...).
 
-    Args:
-        sim: at its start
-        omega: frequency of the slowest mode [1/s]
-        lasts: how long, of 1 / omega
-        of: what to take after each of the last frames
-        part: of the frames that are the last ones
-        least: number of frames
-        calmed: False where the material damps enough
-
-    Returns:
-        what ``of()`` was, shape (last frames, ...)
+    It ``lasts`` for so many 1 / ``omega`` [1/s], that of the slowest mode, ``least`` frames at
+    least, of which a ``part`` are the last; ``calmed`` unless the material damps enough.
     """
     frames = max(least, int(np.ceil(lasts / omega * sim.fps)))
     run = relax(sim, omega, frames) if calmed else sim.frames(frames)

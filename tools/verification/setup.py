@@ -21,13 +21,7 @@ RESPONSES = "default", "literal", "penalty", "predicted"
 
 @dataclass(frozen=True)
 class Ask:
-    """What is asked of a case.
-
-    Attributes:
-        quick: fewer variants, coarser meshes
-        response: one of ``RESPONSES``
-        seed: of the jittered meshes
-    """
+    """What is asked of a case: fewer variants, one of ``RESPONSES``, a seed of jittered meshes."""
 
     quick: bool = True
     response: str = "default"

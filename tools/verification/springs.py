@@ -1,12 +1,17 @@
-"""A1: two overlapping columns are two springs in series.
+"""A1: overlapping columns are springs in series, and a stack of cubes is one column.
 
     p = (g - s) / (L1/E1 + L2/E2),  s = rho1 G L1^2 / 2 E1 - rho2 G L2^2 / 2 E2
     interface at L1 - p L1/E1 - rho1 G L1^2 / 2 E1
 
-for an overlap g of the rest shapes, Poisson ratio 0, outer ends held; s is what gravity adds to
+for an overlap g of two rest shapes, Poisson ratio 0, outer ends held; s is what gravity adds to
 the gap (Spillmann and Teschner 2005, Fig. 6, put into numbers with the strength of materials).
 The densities of the weightless cases go with the moduli, so that both columns have the same
 wave speed; the equilibrium does not know them.
+
+    pressure above cube k = rho G (5 - k) L,  settlement of the top = rho G (5 L)^2 / 2 E
+
+for five cubes of length L under their own weight, base held. They start in this state, with a
+resting gap between them.
 """
 
 from collections.abc import Iterator
@@ -26,6 +31,13 @@ LIMITS = 0.031, 0.005, 1e-5
 SETTLE = 14.0  # 1 / (slowest frequency): exp(-0.7 * 14) = 6e-5 of the overlap remain
 DAMPED = 0.35  # ratio of the slowest mode in the run with a damped material
 LAYERS = 8  # of cells along a column
+ACROSS = 4, 6  # cells across the upper column; the lower one has 4
+
+COUNT, YOUNG, DENSITY = 5, 1e6, 1000.0  # of cubes of 1 m [Pa], [kg/m^3]: 4.9 % strain at the base
+CELLS = (4, 4), (4, 3)  # of the cubes, in turn
+GAP = 2.5e-4  # between the cubes at the start [m]: a thousandth of an edge of a cell
+FRICTION = 0.3
+STACK_SETTLE = 10.0  # the start is near the end
 
 
 @dataclass(frozen=True)
@@ -40,21 +52,12 @@ class Case:
     density: float | None = None
 
     @property
-    def sinks(self) -> tuple[float, float]:
-        """By its own weight: the top of column 1, and the foot of the hanging column 2 [m]."""
+    def exact(self) -> tuple[float, float]:
+        """Pressure [Pa] and height of the interface [m]."""
         weight = (self.density or 0.0) * G
-        return 0.5 * weight * self.l1**2 / self.e1, 0.5 * weight * self.l2**2 / self.e2
-
-    @property
-    def pressure(self) -> float:
-        """Exact [Pa]."""
-        first, second = self.sinks
-        return (self.overlap - first + second) / (self.l1 / self.e1 + self.l2 / self.e2)
-
-    @property
-    def interface(self) -> float:
-        """Exact height [m]."""
-        return self.l1 - self.pressure * self.l1 / self.e1 - self.sinks[0]
+        first, second = 0.5 * weight * self.l1**2 / self.e1, 0.5 * weight * self.l2**2 / self.e2
+        pressure = (self.overlap - first + second) / (self.l1 / self.e1 + self.l2 / self.e2)
+        return pressure, self.l1 - pressure * self.l1 / self.e1 - first
 
 
 CASES = {
@@ -66,13 +69,12 @@ CASES = {
     "unequal lengths": Case(2e5, 0.5, 1e5, 2.0, 0.05),
     "gravity": Case(1e6, 1.0, 3e6, 1.0, 0.02, 1000.0),
 }
-CELLS = 4, 6  # across the upper column; the lower one has 4
 
 
 def run(ask: Ask) -> Iterator[Figure]:
     """Every case; the quick run takes each on matching and on other, turned and jittered cells."""
     quick = ((4, "structured", False), (6, "jittered", True))
-    full = [(n, mesh, turned) for n in CELLS for mesh in MESHES for turned in (False, True)]
+    full = [(n, mesh, turned) for n in ACROSS for mesh in MESHES for turned in (False, True)]
     for name, case in CASES.items():
         for across, mesh, turned in quick if ask.quick else full:
             yield from press(name, case, ask, across, mesh, Pose(turned))
@@ -88,28 +90,28 @@ def press(
     """
     label = f"A1 {name} 4:{across} {mesh} {pose}{' damped' if damped else ''}"
     columns = []
-    for k, (young, length, n) in enumerate(((case.e1, case.l1, 4), (case.e2, case.l2, across))):
-        density = case.density or 1e-2 * young
-        columns.append(Column(young, length, density, (n, n, LAYERS), mesh=mesh, seed=ask.seed + k))
+    for k, (e, length, n) in enumerate(((case.e1, case.l1, 4), (case.e2, case.l2, across))):
+        density = case.density or 1e-2 * e
+        columns.append(Column(e, length, density, (n, n, LAYERS), mesh=mesh, seed=ask.seed + k))
     omega = min(c.slowest for c in columns)
     columns = [replace(c, damping=2.0 * damped / omega) for c in columns]
     gravity = G if case.density else 0.0
     pile = Pile(columns, -case.overlap, clamped=True, pose=pose, gravity=gravity)
     sim = pile.simulate(ask)
     lasts = SETTLE * (ZETA / damped if damped else 1.0)
-    between = lambda: forces(sim, ("body0", "body1"))  # noqa: E731
-    force = rest(sim, omega, lasts, between, calmed=not damped).mean()
-    yield relative(label, "contact force / section [Pa]", force, case.pressure, LIMITS)
-    g = case.overlap
-    for side, z in zip(("lower", "upper"), pile.faces(sim), strict=True):
-        off = float(z.mean() - case.interface) / g
-        name = f"mean height of the {side} face [m]"
-        yield Figure(label, name, float(z.mean()), case.interface, off, LIMITS)
-    yield zero(label, "deepest overlap [of that at the start]", sim.measure().overlap / g, LIMITS)
+    look = lambda: forces(sim, ("body0", "body1"))  # noqa: E731
+    force, (exact, interface) = rest(sim, omega, lasts, look, calmed=not damped).mean(), case.exact
+    yield relative(label, "contact force / section [Pa]", force, exact, LIMITS)
+    for k, side in enumerate(("lower", "upper")):
+        z = float(pile.face(sim, k, 1 - 2 * k).mean())
+        name, off = f"mean height of the {side} face [m]", (z - interface) / case.overlap
+        yield Figure(label, name, z, interface, off, LIMITS)
+    left = sim.measure().overlap / case.overlap
+    yield zero(label, "deepest overlap [of that at the start]", left, LIMITS)
     if case.density is None:
         p = layer_means(sim.scene.bodies[0].mesh, pile.pressures(sim, sim.scene.bodies[0]))
-        worst = p[np.abs(p - case.pressure).argmax()]
-        yield relative(label, "stress of the worst layer [Pa]", worst, case.pressure, LIMITS)
+        worst = p[np.abs(p - exact).argmax()]
+        yield relative(label, "stress of the worst layer [Pa]", worst, exact, LIMITS)
 
 
 def layer_means(mesh: wc.TetMesh, values: np.ndarray) -> np.ndarray:
@@ -118,3 +120,30 @@ def layer_means(mesh: wc.TetMesh, values: np.ndarray) -> np.ndarray:
     low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
     layer = np.clip(((z - low) / (high - low) * LAYERS).astype(int), 0, LAYERS - 1)
     return np.bincount(layer, mesh.volumes * values) / np.bincount(layer, mesh.volumes)
+
+
+def stack(ask: Ask) -> Iterator[Figure]:
+    """Equal and other cells; the full run turns them, mirrors and jitters the meshes too."""
+    plain = [(cells, "structured", False) for cells in CELLS]
+    more = [(cells, mesh, True) for cells in CELLS for mesh in ("mirrored", "jittered")]
+    for cells, mesh, turned in plain if ask.quick else plain + more:
+        yield from stand(ask, cells, mesh, Pose(turned))
+
+
+def stand(ask: Ask, cells: tuple[int, int], mesh: str, pose: Pose) -> Iterator[Figure]:
+    """Forces between the cubes and the height of the top."""
+    label = f"A1 stack of five {cells[0]}:{cells[1]} {mesh} {pose}"
+    counts = [(cells[k % 2],) * 3 for k in range(COUNT)]
+    cubes = [
+        Column(YOUNG, 1.0, DENSITY, count, mesh=mesh, seed=ask.seed + k)
+        for k, count in enumerate(counts)
+    ]
+    pile = Pile(cubes, GAP, pose=pose, gravity=G, friction=FRICTION)
+    sim = pile.start(pile.simulate(ask))
+    pairs = [(f"body{k}", f"body{k + 1}") for k in range(COUNT - 1)]
+    found = rest(sim, cubes[0].slowest / COUNT, STACK_SETTLE, lambda: forces(sim, *pairs))
+    for k, pressure in enumerate(found.mean(axis=0)):
+        exact = DENSITY * G * (COUNT - 1 - k)
+        yield relative(label, f"pressure above cube {k} [Pa]", pressure, exact, LIMITS)
+    settled, exact = COUNT - pile.face(sim, -1, 1).mean(), DENSITY * G * COUNT**2 / (2.0 * YOUNG)
+    yield relative(label, "settlement of the top [m]", settled, exact, LIMITS)

@@ -4,7 +4,9 @@
     and on three points each carries the barycentric part of the centre of mass among them.
 
 On a plane and on another block, whose cells, direction and stiffness are its own; then on a
-membrane held at its rim and on the tips of three fixed tets.
+membrane held at its rim and on the tips of three fixed tets. Last, a light cube carries an equal
+one R times as dense, R from 1 to 10000: E = 20 R rho G L, 5 % of strain in it, Poisson ratio 0. It
+starts in the static state of a column, the wave speeds differ by sqrt(R).
 """
 
 from collections.abc import Iterator
@@ -13,6 +15,8 @@ import numpy as np
 from measure.figure import Figure, relative, zero
 
 import warp_contact as wc
+from verification.columns import Column, Pile
+from verification.relax import rest
 from verification.setup import Ask, G, forces, masses, vertex_areas, watch
 
 EDGE = 0.1  # of a block [m]
@@ -38,6 +42,10 @@ STIFF = 20.0  # times the modulus of the block on the tips: it tilts by its dent
 GRIP = 0.02  # friction on the tips: holds against that tilt, adds 2e-4 to the size of a force
 PENALTY = 500.0, 1.0  # [N/m], [N s/m]: sinks by 1 % of an edge of a cell
 ON_TIP = 1e4, 1.0  # the same for the single contact of a tip
+MASSES = 1.0, 10.0, 100.0, 1e3, 1e4  # R
+CUBES, APART = (2, 3), 3e-5  # cells of the light and the heavy cube, gap at the start [m]
+REST, LEAST = 10.0, 200  # 1 / (slowest frequency), frames
+BLOCK = 10  # frames in a force of the ripple: one alone is a step or two
 
 FORCE = 0.02, 0.001, 1e-5
 RIPPLE = 0.05, 0.005, 1e-5
@@ -65,10 +73,12 @@ def settled(ask: Ask, scene: wc.Scene, penalty: tuple[float, float] = PENALTY) -
     return sim
 
 
-def steady(label: str, name: str, force: np.ndarray, weight: float) -> Iterator[Figure]:
+def steady(
+    label: str, name: str, mean: float, force: np.ndarray, weight: float
+) -> Iterator[Figure]:
     """Mean and ripple of a force [N] that ought to be a weight."""
-    yield relative(label, f"mean force{name} [N]", force.mean(), weight, FORCE)
-    ripple = np.std(force) / max(force.mean(), 1e-9)
+    yield relative(label, f"mean force{name} [N]", mean, weight, FORCE)
+    ripple = np.std(force) / max(mean, 1e-9)
     yield zero(label, f"ripple of the force{name} [of the mean]", ripple, RIPPLE)
 
 
@@ -93,7 +103,7 @@ def stacked(label: str, stack: tuple, ask: Ask) -> Iterator[Figure]:
 
     *found, overlap = watch(sim, STACK_SAMPLE, look).T
     for (first, second), weight, force in zip(carried, carried.values(), found, strict=True):
-        yield from steady(label, f", {second} on {first}", force, weight)
+        yield from steady(label, f", {second} on {first}", force.mean(), force, weight)
     edge = float(sim.model.body_edge.numpy().min())
     yield Figure(label, "deepest overlap [% of an edge]", 100.0 * overlap.max() / edge, most=0.1)
     yield Figure(label, "kinetic energy at the end [J]", sim.measure().kinetic)
@@ -128,7 +138,7 @@ def on_sheet(label: str, ask: Ask) -> Iterator[Figure]:
     scene.add_body(wc.box(EDGE, 3), rubber(), place, label="block")
     sim = settled(ask, scene)
     force = watch(sim, SAMPLE, lambda: forces(sim, ("sheet", "block")))
-    yield from steady(label, "", force, WEIGHT)
+    yield from steady(label, "", force.mean(), force, WEIGHT)
 
 
 def on_points(label: str, ask: Ask) -> Iterator[Figure]:
@@ -149,3 +159,31 @@ def on_points(label: str, ask: Ask) -> Iterator[Figure]:
     part = np.linalg.solve(np.vstack([TIPS.T, np.ones(3)]), [*at, 1.0])
     for k, force in enumerate(mean):
         yield relative(label, f"mean force on tip {k} [N]", force, part[k] * WEIGHT, FORCE)
+
+
+def ladder(ask: Ask) -> Iterator[Figure]:
+    """A light cube below a heavy one; the quick run leaves out every second ratio."""
+    for ratio in MASSES[:: 2 if ask.quick else 1]:
+        yield from carry(ask, ratio)
+
+
+def cubes(ratio: float, young: float) -> Pile:
+    """Both, the centre of the light one at the origin."""
+    both = [
+        Column(young, EDGE, density, (n, n, n), (EDGE, EDGE))
+        for density, n in zip((DENSITY, ratio * DENSITY), CUBES, strict=True)
+    ]
+    return Pile(both, APART, -0.5 * EDGE, gravity=G, friction=0.3)
+
+
+def carry(ask: Ask, ratio: float) -> Iterator[Figure]:
+    """Mean and ripple of the force on the light cube's top, and the overlap there."""
+    label = f"A7m heavy on light, mass ratio {ratio:g}"
+    young = 20.0 * ratio * DENSITY * G * EDGE
+    pile = cubes(ratio, young)
+    sim = pile.start(pile.simulate(ask))
+    omega = float(np.sqrt(young * EDGE / (ratio * DENSITY * EDGE**3)))
+    force = rest(sim, omega, REST, lambda: forces(sim, ("body0", "body1")), 0.5, LEAST)[:, 0]
+    blocks = force[: len(force) // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)
+    yield from steady(label, "", force.mean(), blocks, ratio * WEIGHT)
+    yield zero(label, "deepest overlap [of an edge]", sim.measure().overlap * CUBES[1] / EDGE)

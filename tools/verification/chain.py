@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import warp_contact as wc
-from verification.setup import on_face
+from verification.setup import gradients, on_face
 from warp_contact.scene.scene import Body
 
 
@@ -36,16 +36,18 @@ def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> tuple[np.nda
     above += len(lower.x)
     mass = np.concatenate([masses(lower), masses(upper)])
     reduced = 1.0 / (1.0 / mass[below] + 1.0 / mass[above])
-    k = np.concatenate([stiffness(lower), stiffness(upper)])
+    grad = np.concatenate([gradients(b.x, b.mesh.tets) for b in scene.bodies])
+    stiff = np.concatenate([b.material.youngs_modulus * b.mesh.volumes for b in scene.bodies])
     tets = np.concatenate([lower.mesh.tets, upper.mesh.tets + len(lower.x)])
-    at = (3 * tets[:, :, None] + np.arange(3)).reshape(-1, 12)  # where a tet's u are among all
+    at = (3 * tets[:, :, None] + np.arange(3)).ravel()  # where a tet's forces are among all
     v = np.concatenate([lower.v, upper.v])
     u = np.zeros_like(v)
 
     def pull() -> np.ndarray:
-        """K u [N], shape (n_vert, 3)."""
-        of_tets = np.einsum("tij,tj->ti", k, u.ravel()[at])
-        return np.bincount(at.ravel(), of_tets.ravel(), u.size).reshape(u.shape)
+        """K u [N], shape (n_vert, 3): that of the energy V E eps : eps / 2, eps = sym(grad u)."""
+        strain = np.einsum("tci,tcj->tij", u[tets], grad)
+        strain = 0.5 * (strain + strain.swapaxes(1, 2)) * stiff[:, None, None]
+        return np.bincount(at, (grad @ strain).ravel(), u.size).reshape(u.shape)
 
     def energy() -> float:
         return 0.5 * float(mass @ (v**2).sum(axis=1) + (u * pull()).sum())
@@ -69,17 +71,3 @@ def masses(body: Body) -> np.ndarray:
     """A quarter of each tet at each of its corners [kg], shape (n_vert,)."""
     quarter = 0.25 * body.material.density * body.mesh.volumes
     return np.bincount(body.mesh.tets.ravel(), np.repeat(quarter, 4), len(body.x))
-
-
-def stiffness(body: Body) -> np.ndarray:
-    """Linear stiffness of each tet for a Poisson ratio of 0 [N/m], shape (n_tet, 12, 12).
-
-    The energy is V E eps : eps / 2 with the strain eps = sym(grad u).
-    """
-    corners = body.x[body.mesh.tets]
-    grad = np.linalg.inv(corners[:, 1:] - corners[:, :1])  # (t, xyz, corners 1 to 3)
-    grad = np.concatenate([-grad.sum(axis=2, keepdims=True), grad], axis=2)
-    both = np.einsum("tca,tcb->tab", grad, grad)
-    k = np.einsum("tab,cd->tacbd", both, np.eye(3)) + np.einsum("tda,tcb->tacbd", grad, grad)
-    k *= 0.5 * body.material.youngs_modulus * body.mesh.volumes[:, None, None, None, None]
-    return k.reshape(-1, 12, 12)

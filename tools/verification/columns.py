@@ -14,7 +14,7 @@ import numpy as np
 
 import warp_contact as wc
 from verification.relax import step_rate
-from verification.setup import ALIGNED, Ask, Pose, block, on_face
+from verification.setup import ALIGNED, Ask, Pose, block, gradients, on_face
 from warp_contact.scene.scene import Body
 
 
@@ -117,10 +117,7 @@ class Pile:
 
 def stress(body: Body, x: np.ndarray) -> np.ndarray:
     """P [Pa] of each tet at ``x`` [m], in the axes of the mesh; in doubles, shape (m, 3, 3)."""
-    at, rest = (
-        np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2).astype(float)
-        for corners in (x[body.mesh.tets], body.mesh.vertices[body.mesh.tets])
-    )
-    f = at @ np.linalg.inv(rest)
+    grad = gradients(body.mesh.vertices, body.mesh.tets)
+    f = np.einsum("tci,tcj->tij", x[body.mesh.tets].astype(float), grad)
     u, _, vt = np.linalg.svd(f)
     return body.material.youngs_modulus * (f - u @ vt)

@@ -98,12 +98,8 @@ def slide(ask: Ask, ratio: float, fixed: bool) -> tuple[float, dict[str, float]]
 
 def drag(ask: Ask, ratio: float, fixed: bool) -> Iterator[Figure]:
     """Ripples of both forces and of the height."""
-    yield from judged(*slide(ask, ratio, fixed), ratio, fixed)
-
-
-def judged(weight: float, felt: dict[str, float], ratio: float, fixed: bool) -> Iterator[Figure]:
-    """A slide against its limits."""
     label = f"A9 facets 1:{ratio:g}, {'fixed' if fixed else 'deformable'} base"
+    weight, felt = slide(ask, ratio, fixed)
     yield relative(label, MEAN, felt[MEAN], weight, NORMAL)
     for name, limits in LIMITS.items():
         yield zero(label, name, felt[name], limits if fixed or name != HEIGHT else ())
@@ -112,13 +108,13 @@ def judged(weight: float, felt: dict[str, float], ratio: float, fixed: bool) -> 
 
 def compare(ask: Ask, ratio: float) -> Iterator[Figure]:
     """On the deformable block with the weights, then without; the reference is with them."""
-    weight, on = slide(ask, ratio, fixed=False)
-    yield from judged(weight, on, ratio, fixed=False)
+    on = list(drag(ask, ratio, fixed=False))
+    yield from on
     for how in (CLOSEST, EQUAL):
         with switched_off(how):
             _, off = slide(ask, ratio, fixed=False)
-        for name, value in off.items():
-            yield Figure(f"A9 facets 1:{ratio:g}, {how}", name, float(value), on[name])
+        for f in on:
+            yield Figure(f"A9 facets 1:{ratio:g}, {how}", f.name, float(off[f.name]), f.value)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ with the ends free; its modulus is the E* of a ratio of 0.3, which is all that t
 They are those of rows of vertices along the line: force over the width of a row.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from measure.figure import Figure, relative, zero
@@ -75,13 +75,23 @@ E_STAR, ORIGIN = modulus(YOUNG), (0.0, 0.0, 0.0)  # [Pa], [m]
 
 
 def run(ask: Ask) -> Iterator[Figure]:
-    """A plane with 1, 2, 4 elements, the exponent of F(d), then pairs; quick leaves 4 out."""
-    for n in COUNTS[: 2 if ask.quick else None]:
-        for turned in (False,) if ask.quick else (False, True):
-            yield from on_plane(ask, n, Pose(turned))
+    """A sphere on a plane, the exponent of F(d), then pairs, quick one of them."""
+    yield from planes(ask, on_plane)
     yield from exponent(ask, 2)
     for name in list(PAIRS)[: 1 if ask.quick else None]:
         yield from on_sphere(ask, name, 2)
+
+
+def cylinder(ask: Ask) -> Iterator[Figure]:
+    """A cylinder on a plane."""
+    return planes(ask, line_on_plane)
+
+
+def planes(ask: Ask, on_plane: Callable) -> Iterator[Figure]:
+    """1, 2 and 4 elements across; quick leaves 4 and the turned ones out."""
+    for n in COUNTS[: 2 if ask.quick else None]:
+        for turned in (False,) if ask.quick else (False, True):
+            yield from on_plane(ask, n, Pose(turned))
 
 
 def cap(radius: float, size: float, rings: int) -> wc.TetMesh:
@@ -126,13 +136,10 @@ def squeeze(
     for mesh, material, place, q in bodies:
         z = mesh.vertices[:, 2]
         scene.add_body(mesh, material, place, q, fixed=z > 0.999 * z.max())
-    mesh, material = bodies[0][:2]
-    young, speed = (
-        material.youngs_modulus,
-        pressure_wave(material.youngs_modulus, material.poisson_ratio),
-    )
+    young, poisson = bodies[0][1].youngs_modulus, bodies[0][1].poisson_ratio
+    speed = pressure_wave(young, poisson)
     sim = wc.Simulation(scene, ask.respond(100.0 * young * size), fps=step_rate(size, speed))
-    omega = 0.5 * np.pi * speed / mesh.vertices[:, 2].max()
+    omega = 0.5 * np.pi * speed / bodies[0][0].vertices[:, 2].max()
     p = rest(sim, omega, SETTLE, lambda: sim.contact_fields()["pressure"].astype(float))
     return sim, p.mean(axis=0)
 
@@ -168,15 +175,11 @@ def below(
 def profile(
     label: str, names: tuple[str, str], found: tuple, exact: tuple, moment: float, n: int
 ) -> Iterator[Figure]:
-    """Pressures against p0 sqrt(1 - r^2 / a^2) at the same force.
+    """Pressures against p0 sqrt(1 - r^2 / a^2) at the same force, with n elements across a.
 
-    Args:
-        label: of the case
-        names: of the force and of a
-        found: places r [m], pressures there [Pa], and how much of the surface each is for
-        exact: what gives a [m] and p0 [Pa] at a force, the radius [m], E* [Pa]
-        moment: a^2 over the second moment of p
-        n: elements across a
+    ``names`` are those of the force and of a. What was found are places r [m], pressures there [Pa]
+    and how much of the surface each is for; exact is what gives a [m] and p0 [Pa] for a force, with
+    the radius [m] and E* [Pa] for it, and ``moment`` is a^2 over the second moment of p.
     """
     r, p, area = found
     force = float(p @ area)
@@ -229,13 +232,6 @@ def on_sphere(ask: Ask, name: str, n: int) -> Iterator[Figure]:
         bodies.append((cap(own, a / n, RINGS[n]), material, place, turns[k]))
     sim, p = squeeze(ask, bodies, a / n)
     yield from below(f"A3 {name}, N = {n}", sim, p, radius, e_star, n, ALIGNED)
-
-
-def cylinder(ask: Ask) -> Iterator[Figure]:
-    """1, 2 and 4 elements across; quick leaves 4 and the turned ones out."""
-    for n in COUNTS[: 2 if ask.quick else None]:
-        for turned in (False,) if ask.quick else (False, True):
-            yield from line_on_plane(ask, n, Pose(turned))
 
 
 def slab(size: float, columns: int) -> wc.TetMesh:

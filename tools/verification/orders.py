@@ -72,9 +72,18 @@ def impact(ask: Ask, counts) -> Iterator[Figure]:
     yield order(label, "order of the energy lost", sizes, lost, IMPACT)
 
 
-def in_steps(label: str, name: str, states: list) -> Figure:
-    """Order of the states [m] after the numbers of steps: differences of successive ones."""
-    errors = [np.linalg.norm(b - a) for a, b in pairwise(states)]
+def in_steps(label: str, name: str, start: tuple, x: np.ndarray, seconds: float, of) -> Figure:
+    """Order of what ``of(sim)`` [m] is after some time, from differences of successive steps.
+
+    ``start`` is a scene, a response and the frames per second, ``x`` the positions [m].
+    """
+    found = []
+    for n in SUBSTEPS:
+        sim = wc.Simulation(*start, substeps=n)
+        sim.state.x.assign(x)
+        watch(sim, seconds)
+        found.append(of(sim).astype(float))
+    errors = [np.linalg.norm(b - a) for a, b in pairwise(found)]
     label = f"{label}, {', '.join(map(str, SUBSTEPS))} steps a frame"
     return order(label, name, 1.0 / np.array(SUBSTEPS[:-1]), errors, SMOOTH)
 
@@ -82,14 +91,10 @@ def in_steps(label: str, name: str, states: list) -> Figure:
 def sliding(ask: Ask) -> Iterator[Figure]:
     """Place of a block on a slope, in motion from the start: letting go is not smooth."""
     scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
-    at_rest = friction.begin(ask, scene).positions()
-    places = []
-    for n in SUBSTEPS:
-        sim = wc.Simulation(scene, ask.respond(*friction.PENALTY), FPS, substeps=n)
-        sim.state.x.assign(at_rest)
-        watch(sim, SLIDES)
-        places.append(friction.centre(sim)[0, :1])
-    yield in_steps("A8 sliding block", "order of the place in dt", places)
+    x = friction.begin(ask, scene).positions()
+    start = scene, ask.respond(*friction.PENALTY), FPS
+    place = lambda sim: friction.centre(sim)[0, :1]  # noqa: E731
+    yield in_steps("A8 sliding block", "order of the place in dt", start, x, SLIDES, place)
 
 
 def resting(ask: Ask) -> Iterator[Figure]:
@@ -102,15 +107,10 @@ def resting(ask: Ask) -> Iterator[Figure]:
     omega = 0.5 * np.pi * WAVE / LENGTH
     for _ in relax(at_rest, omega, round(14.0 / omega * fps)):
         pass
-    states = []
-    for n in SUBSTEPS:
-        rate = 10.0 * WAVE / LENGTH
-        sim = wc.Simulation(standing(1.0), ask.respond(ON_PLANE), rate, substeps=n)
-        sim.state.x.assign(at_rest.positions())
-        watch(sim, WAIT / rate)
-        v = sim.velocities() * LENGTH / WAVE
-        states.append(np.concatenate([sim.positions(), v]).astype(float))
-    yield in_steps("A8 resting bar", "order of the state in dt", states)
+    rate = 10.0 * WAVE / LENGTH
+    start, x = (standing(1.0), ask.respond(ON_PLANE), rate), at_rest.positions()
+    state = lambda sim: np.append(sim.positions(), sim.velocities() * LENGTH / WAVE)  # noqa: E731
+    yield in_steps("A8 resting bar", "order of the state in dt", start, x, WAIT / rate, state)
 
 
 def standing(part: float) -> wc.Scene:

@@ -87,6 +87,12 @@ def on_face(mesh: wc.TetMesh, axis: int, side: int) -> np.ndarray:
     return x > x.max() - 1e-6 * np.ptp(x)
 
 
+def gradients(x: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Of the linear shape functions of the corners of each tet [1/m], shape (n_tet, 4, 3)."""
+    g = np.linalg.inv(x[tets[:, 1:]] - x[tets[:, :1]]).swapaxes(1, 2)
+    return np.concatenate([-g.sum(axis=1, keepdims=True), g], axis=1)
+
+
 def watch(sim: wc.Simulation, seconds: float, of: Callable = lambda: None) -> np.ndarray:
     """Step for some time [s]; what ``of()`` is after each frame, shape (frames, ...)."""
     return np.array([of() for _ in sim.frames(round(seconds * sim.fps))])

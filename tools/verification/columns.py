@@ -9,12 +9,13 @@ corotated column is then exactly linear in its axial stretch, P = E (F - R) with
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 import warp_contact as wc
 from verification.relax import step_rate
-from verification.setup import ALIGNED, Ask, Pose, block, gradients, on_face
+from verification.setup import ALIGNED, Ask, Pose, block, forces, gradients, on_face
 from warp_contact.scene.scene import Body
 
 
@@ -121,3 +122,9 @@ def stress(body: Body, x: np.ndarray) -> np.ndarray:
     f = np.einsum("tci,tcj->tij", x[body.mesh.tets].astype(float), grad)
     u, _, vt = np.linalg.svd(f)
     return body.material.youngs_modulus * (f - u @ vt)
+
+
+def between(sim: wc.Simulation) -> np.ndarray:
+    """Forces [N] between neighbours, from below."""
+    labels = [body.label for body in sim.scene.bodies]
+    return forces(sim, *pairwise(labels))

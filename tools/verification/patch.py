@@ -12,9 +12,9 @@ import numpy as np
 from measure.figure import Figure, relative, rms, zero
 
 import warp_contact as wc
-from verification.columns import Column, Pile
+from verification.columns import Column, Pile, between
 from verification.relax import rest
-from verification.setup import ALIGNED, Ask, Pose, forces
+from verification.setup import ALIGNED, Ask, Pose
 
 YOUNG, DENSITY = 1e6, 1000.0  # [Pa], [kg/m^3]
 HEIGHT, PUSH = 0.5, 0.01  # of a block, of the upper end [m]
@@ -62,7 +62,7 @@ def press(
     bodies = sim.scene.bodies
 
     def look() -> np.ndarray:
-        return np.append(pile.pressures(sim, *bodies), forces(sim, ("body0", "body1")))
+        return np.append(pile.pressures(sim, *bodies), between(sim))
 
     *stress, force = rest(sim, pile.columns[0].slowest, SETTLE, look).mean(axis=0)
     error = np.abs(np.array(stress) / EXACT - 1.0)

@@ -21,9 +21,9 @@ import numpy as np
 from measure.figure import Figure, relative, zero
 
 import warp_contact as wc
-from verification.columns import Column, Pile
+from verification.columns import Column, Pile, between
 from verification.relax import ZETA, rest
-from verification.setup import ALIGNED, MESHES, Ask, G, Pose, forces
+from verification.setup import ALIGNED, MESHES, Ask, G, Pose
 
 # Good: the quantum of the paper's search, 2^-5 of the overlap. Excellent: half of what penalty
 # forces of 100 E / L leave. Best: float32.
@@ -99,8 +99,8 @@ def press(
     pile = Pile(columns, -case.overlap, clamped=True, pose=pose, gravity=gravity)
     sim = pile.simulate(ask)
     lasts = SETTLE * (ZETA / damped if damped else 1.0)
-    look = lambda: forces(sim, ("body0", "body1"))  # noqa: E731
-    force, (exact, interface) = rest(sim, omega, lasts, look, calmed=not damped).mean(), case.exact
+    force = rest(sim, omega, lasts, lambda: between(sim), calmed=not damped).mean()
+    exact, interface = case.exact
     yield relative(label, "contact force / section [Pa]", force, exact, LIMITS)
     for k, side in enumerate(("lower", "upper")):
         z = float(pile.face(sim, k, 1 - 2 * k).mean())
@@ -140,8 +140,7 @@ def stand(ask: Ask, cells: tuple[int, int], mesh: str, pose: Pose) -> Iterator[F
     ]
     pile = Pile(cubes, GAP, pose=pose, gravity=G, friction=FRICTION)
     sim = pile.start(pile.simulate(ask))
-    pairs = [(f"body{k}", f"body{k + 1}") for k in range(COUNT - 1)]
-    found = rest(sim, cubes[0].slowest / COUNT, STACK_SETTLE, lambda: forces(sim, *pairs))
+    found = rest(sim, cubes[0].slowest / COUNT, STACK_SETTLE, lambda: between(sim))
     for k, pressure in enumerate(found.mean(axis=0)):
         exact = DENSITY * G * (COUNT - 1 - k)
         yield relative(label, f"pressure above cube {k} [Pa]", pressure, exact, LIMITS)

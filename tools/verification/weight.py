@@ -15,7 +15,7 @@ import numpy as np
 from measure.figure import Figure, relative, zero
 
 import warp_contact as wc
-from verification.columns import Column, Pile
+from verification.columns import Column, Pile, between
 from verification.relax import rest
 from verification.setup import Ask, G, forces, masses, vertex_areas, watch
 
@@ -88,8 +88,7 @@ def stacked(label: str, stack: tuple, ask: Ask) -> Iterator[Figure]:
     scene = wc.Scene(gravity=(0.0, 0.0, -G))
     scene.add_plane((0.0, 0.0, 1.0), 0.0)
     soft = max(1.0, 1.0 / ratio)
-    place = np.array([0.0, 0.0, 0.5 * EDGE + GAP])
-    scene.add_body(wc.box(EDGE, lower), rubber(soft), place, label="lower")
+    scene.add_body(wc.box(EDGE, lower), rubber(soft), (0, 0, 0.5 * EDGE + GAP), label="lower")
     if upper:
         turn = rotation or (0.0, 0.0, 0.0, 1.0)
         place = (0.0, 0.0, 1.5 * EDGE + 2.0 * GAP)
@@ -183,7 +182,7 @@ def carry(ask: Ask, ratio: float) -> Iterator[Figure]:
     pile = cubes(ratio, young)
     sim = pile.start(pile.simulate(ask))
     omega = float(np.sqrt(young * EDGE / (ratio * DENSITY * EDGE**3)))
-    force = rest(sim, omega, REST, lambda: forces(sim, ("body0", "body1")), 0.5, LEAST)[:, 0]
+    force = rest(sim, omega, REST, lambda: between(sim), 0.5, LEAST)[:, 0]
     blocks = force[: len(force) // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)
     yield from steady(label, "", force.mean(), blocks, ratio * WEIGHT)
     yield zero(label, "deepest overlap [of an edge]", sim.measure().overlap * CUBES[1] / EDGE)

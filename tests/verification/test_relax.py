@@ -15,8 +15,9 @@ OMEGA = BAR.slowest
 def hanging(pose: Pose) -> wc.Simulation:
     """A bar that hangs from its upper end, unloaded at first."""
     scene = wc.Scene(gravity=pose.out((0.0, 0.0, -G)))
-    rest = BAR.rest
-    scene.add_body(rest, BAR.material, rotation=pose.q, fixed=on_face(rest, 2, 1))
+    rest = block((*BAR.section, BAR.length), BAR.cells)
+    material = wc.Corotated(BAR.young, 0.0, BAR.density)
+    scene.add_body(rest, material, rotation=pose.q, fixed=on_face(rest, 2, 1))
     return wc.Simulation(scene, fps=step_rate(0.25, BAR.wave_speed))
 
 

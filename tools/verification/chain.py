@@ -28,12 +28,7 @@ def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> tuple[np.nda
         ValueError: the vertices at the ends do not face each other
     """
     lower, upper = scene.bodies
-    below = np.flatnonzero(on_face(lower.mesh, 2, 1))
-    above = np.flatnonzero(on_face(upper.mesh, 2, -1))
-    if len(below) != len(above) or not np.allclose(lower.x[below, :2], upper.x[above, :2]):
-        raise ValueError("the vertices at the ends of the bars do not face each other")
-    start = upper.x[above, 2] - lower.x[below, 2]
-    above += len(lower.x)
+    below, above, start = ends(lower, upper)
     mass = np.concatenate([masses(lower), masses(upper)])
     reduced = 1.0 / (1.0 / mass[below] + 1.0 / mass[above])
     grad = np.concatenate([gradients(b.x, b.mesh.tets) for b in scene.bodies])
@@ -65,6 +60,15 @@ def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> tuple[np.nda
             impulse += j.sum()
         rows.append((impulse, energy() / first))
     return *np.array(rows).T, mass, v
+
+
+def ends(lower: Body, upper: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices at the ends that meet, those of the upper bar counted on, and their gaps [m]."""
+    below = np.flatnonzero(on_face(lower.mesh, 2, 1))
+    above = np.flatnonzero(on_face(upper.mesh, 2, -1))
+    if len(below) != len(above) or not np.allclose(lower.x[below, :2], upper.x[above, :2]):
+        raise ValueError("the vertices at the ends of the bars do not face each other")
+    return below, above + len(lower.x), upper.x[above, 2] - lower.x[below, 2]
 
 
 def masses(body: Body) -> np.ndarray:

@@ -1,15 +1,13 @@
 """The scenes for two seconds with both responses; the bowl alone, with contact surfaces."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 from measure.figure import Figure
 
 import warp_contact as wc
-from verification.heights import facing, height
-from verification.setup import Ask
+from verification.setup import Ask, facing, height
 from warp_contact import SimulationError, scenes
 from warp_contact.scenes import bowl as dish
 from warp_contact.scenes import membrane_stack
@@ -22,51 +20,66 @@ DEEPEST = 1.0  # overlap that a contact surface may leave [% of an edge]
 TIMES = 0.0, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0  # of the energies that are shown [s]
 
 
-@dataclass
-class Run:
-    """What one run showed at its start and after each frame, and why it stopped early.
-
-    ``overlap`` is the deepest, in edges of the finer of its two bodies.
-    """
-
-    sim: wc.Simulation
-    error: str = ""
-    measured: list[wc.Measure] = field(default_factory=list)
-    overlap: list[float] = field(default_factory=list)
-
-    def look(self) -> None:
-        """Measure a frame."""
-        self.measured.append(self.sim.measure())
-        self.overlap.append(in_edges(self.sim, self.measured[-1]))
-
-
 def run(ask: Ask) -> Iterator[Figure]:
     """Every scene but the bowl."""
     frames = round((QUICK if ask.quick else DURATION) * FPS)
     for name in sorted(set(scenes.names()) - {"bowl"}):
         module = scenes.load(name)
         for response in (wc.ContactSurface(), wc.Penalty(**module.PENALTY)):
-            yield from figures(name, play(module.build(), response, frames))
+            yield from play(name, module.build(), response, frames)
 
 
 def bowl(ask: Ask) -> Iterator[Figure]:
     """The bowl of fruit in 64 steps a frame: long on a CPU."""
     settings, duration = ({"fraction": 0.2}, 0.25) if ask.quick else ({}, DURATION)
     scene = scenes.load("bowl").build(**settings)
-    yield from figures("bowl", play(scene, wc.ContactSurface(), round(duration * FPS), 64))
+    return play("bowl", scene, wc.ContactSurface(), round(duration * FPS), 64)
 
 
-def play(scene: wc.Scene, response, frames: int, substeps: int | None = None) -> Run:
-    """Run a scene and keep what was measured."""
+def play(
+    name: str, scene: wc.Scene, response, frames: int, substeps: int | None = None
+) -> Iterator[Figure]:
+    """Run a scene: what counts for every one, then what its picture shows."""
     sim = wc.Simulation(scene, response, fps=FPS, substeps=substeps)
-    out = Run(sim)
-    out.look()
+    measured, error = [sim.measure()], ""
     try:
-        for _ in sim.frames(frames):
-            out.look()
-    except SimulationError as error:
-        out.error = str(error)
-    return out
+        measured += (sim.measure() for _ in sim.frames(frames))
+    except SimulationError as stop:
+        error = str(stop)
+    strict = isinstance(response, wc.ContactSurface)
+    case = f"scenes {name} {'contact surface' if strict else 'penalty'}"
+    yield Figure(case, "stopped by an error", float(bool(error)), most=0.0, note=error)
+    ratios, end = [m.volume_ratio for m in measured], f"{sim.time:.2f} s"
+    least = TINY if strict else None
+    yield Figure(case, f"smallest volume ratio at {end}", ratios[-1], least=least)
+    yield Figure(case, "smallest volume ratio ever", min(ratios))
+    lost = FALLEN[name](sim) if name in FALLEN else not_rising(sim, STACKS[name])
+    most = 0.0 if strict else None
+    yield Figure(case, "bodies fallen through", len(lost), most=most, note=", ".join(lost))
+    yield from overlaps(case, sim, measured, strict)
+    yield Figure(case, "kinetic energy, largest [J]", max(m.kinetic for m in measured))
+    yield Figure(case, f"kinetic energy at {end} [J]", measured[-1].kinetic)
+    for figure, value in SHOWN.get(name, lambda *_: {})(sim, measured).items():
+        yield Figure(case, figure, value)
+
+
+def overlaps(
+    case: str, sim: wc.Simulation, measured: list[wc.Measure], strict: bool
+) -> Iterator[Figure]:
+    """When an overlap at the start is resolved; the deepest one from then on, and the last."""
+    overlap = [in_edges(sim, m) for m in measured]
+    clear = next((k for k, depth in enumerate(overlap) if depth <= CLEAR), None)
+    if clear != 0:
+        first = float("nan") if clear is None else clear
+        most = sim.frame if strict else None
+        yield Figure(case, "first frame without overlap", first, most=most)
+    since = min(sim.frame, 1) if clear is None else clear
+    frame = since + int(np.argmax(overlap[since:]))
+    pair = " in ".join(measured[frame].overlap_pair or ())
+    most, note = DEEPEST if strict else None, f"in frame {frame}: {pair}" if pair else ""
+    name = "deepest overlap [% of an edge]"
+    yield Figure(case, name, 100.0 * overlap[frame], most=most, note=note)
+    yield Figure(case, f"overlap at {sim.time:.2f} s [% of an edge]", 100.0 * overlap[-1])
 
 
 def in_edges(sim: wc.Simulation, measured: wc.Measure) -> float:
@@ -74,37 +87,6 @@ def in_edges(sim: wc.Simulation, measured: wc.Measure) -> float:
     edge = dict(zip(sim.model.labels, sim.model.body_edge.numpy().tolist(), strict=True))
     pair = measured.overlap_pair or ()
     return measured.overlap / min((edge[label] for label in pair if label in edge), default=1.0)
-
-
-def figures(name: str, out: Run) -> Iterator[Figure]:
-    """What counts for every scene, then what its picture shows."""
-    strict = isinstance(out.sim.response, wc.ContactSurface)
-    case = f"scenes {name} {'contact surface' if strict else 'penalty'}"
-    last, ratios = out.sim.frame, [m.volume_ratio for m in out.measured]
-    end = f"{out.sim.time:.2f} s"
-    stopped = float(bool(out.error))
-    yield Figure(case, "stopped by an error", stopped, most=0.0, note=out.error)
-    least = TINY if strict else None
-    yield Figure(case, f"smallest volume ratio at {end}", ratios[-1], least=least)
-    yield Figure(case, "smallest volume ratio ever", min(ratios))
-    lost = FALLEN[name](out.sim) if name in FALLEN else not_rising(out.sim, STACKS[name])
-    most = 0.0 if strict else None
-    yield Figure(case, "bodies fallen through", len(lost), most=most, note=", ".join(lost))
-    clear = next((k for k, overlap in enumerate(out.overlap) if overlap <= CLEAR), None)
-    if clear != 0:
-        first = float("nan") if clear is None else clear
-        yield Figure(case, "first frame without overlap", first, most=last if strict else None)
-    since = min(last, 1) if clear is None else clear
-    deepest = since + int(np.argmax(out.overlap[since:]))
-    pair = " in ".join(out.measured[deepest].overlap_pair or ())
-    note = f"in frame {deepest}: {pair}" if pair else ""
-    most, value = DEEPEST if strict else None, 100.0 * out.overlap[deepest]
-    yield Figure(case, "deepest overlap [% of an edge]", value, most=most, note=note)
-    yield Figure(case, f"overlap at {end} [% of an edge]", 100.0 * out.overlap[-1])
-    yield Figure(case, "kinetic energy, largest [J]", max(m.kinetic for m in out.measured))
-    yield Figure(case, f"kinetic energy at {end} [J]", out.measured[-1].kinetic)
-    for figure, value in SHOWN.get(name, lambda _: {})(out).items():
-        yield Figure(case, figure, value)
 
 
 # Of each scene, the bodies whose centre is no longer above what carries them.
@@ -161,34 +143,29 @@ FALLEN = {"cubes_on_membrane": through_membrane, "bowl": out_of_dish}
 # What the paper's pictures show.
 
 
-def sink_depths(out: Run) -> dict[str, float]:
+def sink_depths(sim: wc.Simulation, measured: list[wc.Measure]) -> dict[str, float]:
     """How far the bottoms of the cubes are below the membrane."""
-    sheet, *cubes = out.sim.scene.bodies
-    top, x = facing(sheet.x, sheet.mesh.surface, 1.0), out.sim.positions(sheet)
+    sheet, *cubes = sim.scene.bodies
+    top, x = facing(sheet.x, sheet.mesh.surface, 1.0), sim.positions(sheet)
     figures = {}
     for cube in cubes:
-        low = np.unique(facing(cube.x, cube.mesh.surface, -1.0))
-        foot = out.sim.positions(cube)[low]
+        foot = sim.positions(cube)[np.unique(facing(cube.x, cube.mesh.surface, -1.0))]
         sink = 1e3 * (height(foot, x, top) - foot[:, 2])
         figures[f"sink depth of {cube.label}, largest [mm]"] = float(np.nanmax(sink))
         figures[f"sink depth of {cube.label}, mean [mm]"] = float(np.nanmean(sink))
     return figures
 
 
-def stack_figures(out: Run) -> dict[str, float]:
+def stack_figures(sim: wc.Simulation, measured: list[wc.Measure]) -> dict[str, float]:
     """Height of the stack, and its energies over time."""
-    high = out.sim.positions(out.sim.scene.bodies[-1]).mean(axis=0)[2]
-    high += 0.5 * membrane_stack.THICKNESS
+    high = sim.positions(sim.scene.bodies[-1]).mean(axis=0)[2] + 0.5 * membrane_stack.THICKNESS
     whole = membrane_stack.COUNT * membrane_stack.THICKNESS
     figures = {"height of the stack [% of its rest height]": 100.0 * float(high) / whole}
-    part = 100.0 / out.measured[0].gravitational
-    for t, k in ((t, round(t * FPS)) for t in TIMES):
-        if k < len(out.measured):
-            now = out.measured[k]
-            figures[f"kinetic energy at {t:g} s [% of first]"] = part * now.kinetic
-            figures[f"potential energy at {t:g} s [% of first]"] = part * (
-                now.gravitational + now.elastic
-            )
+    part = 100.0 / measured[0].gravitational
+    for t, now in ((t, measured[round(t * FPS)]) for t in TIMES if t <= sim.time):
+        potential = now.gravitational + now.elastic
+        figures[f"kinetic energy at {t:g} s [% of first]"] = part * now.kinetic
+        figures[f"potential energy at {t:g} s [% of first]"] = part * potential
     return figures
 
 

@@ -12,8 +12,7 @@ import numpy as np
 from measure.figure import Figure, zero
 
 import warp_contact as wc
-from verification.heights import facing, height
-from verification.setup import Ask
+from verification.setup import Ask, facing, height
 from warp_contact.data.contacts import Capacity
 from warp_contact.data.work import Work, allocate_work
 from warp_contact.step import broad_phase, step, surface

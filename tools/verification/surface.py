@@ -5,11 +5,10 @@ its cells, and the surface belongs at the part a = k_other / (k_own + k_other) o
 where the block's own surface was.
 """
 
-from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-from measure.figure import Figure, zero
+from measure.figure import Figure, Figures, zero
 
 import warp_contact as wc
 from verification.setup import Ask, facing, height
@@ -35,7 +34,7 @@ MATERIALS = {
 SEARCHES = "balanced", "literal"
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Every combination, whatever the response; the quick run takes one material."""
     materials = list(MATERIALS)[: 1 if ask.quick else None]
     for way, name, cells, ratio in product(SEARCHES, materials, CELLS, RATIOS):
@@ -60,7 +59,7 @@ def prepare(way: str, *block) -> tuple[wc.Simulation, Work]:
 
 def place(
     case: str, way: str, model, poisson: float, cells: tuple[int, int], ratio: float
-) -> Iterator[Figure]:
+) -> Figures:
     """Figures of one combination; those of the literal search are shown only."""
     block = model, poisson, cells, ratio
     sim, work = prepare(way, *block)

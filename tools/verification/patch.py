@@ -54,7 +54,7 @@ def press(ask: Ask, cells: tuple, slab: bool, pose: Pose, mesh="structured") -> 
     """Stresses of all tets and the force between the blocks."""
     label = f"A2 {'slab' if slab else 'solid'} {cells[0]}:{cells[1]} {mesh} {pose}"
     pile = pair(cells, slab, pose, mesh, ask.seed)
-    sim = pile.start(pile.simulate(ask), EXACT)
+    sim = pile.simulate(ask, EXACT)
     bodies = sim.scene.bodies
 
     def look() -> np.ndarray:

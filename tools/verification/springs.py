@@ -137,7 +137,7 @@ def stand(ask: Ask, cells: tuple[int, int], mesh: str, pose: Pose) -> Figures:
         for k, count in enumerate(counts)
     ]
     pile = Pile(cubes, GAP, pose=pose, gravity=G, friction=FRICTION)
-    sim = pile.start(pile.simulate(ask))
+    sim = pile.simulate(ask, 0.0)
     found = rest(sim, cubes[0].slowest / COUNT, STACK_SETTLE, lambda: between(sim))
     for k, pressure in enumerate(found.mean(axis=0)):
         exact = DENSITY * G * (COUNT - 1 - k)

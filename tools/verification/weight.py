@@ -176,7 +176,7 @@ def carry(ask: Ask, ratio: float) -> Figures:
     label = f"A7m heavy on light, mass ratio {ratio:g}"
     young = 20.0 * ratio * DENSITY * G * EDGE
     pile = cubes(ratio, young)
-    sim = pile.start(pile.simulate(ask))
+    sim = pile.simulate(ask, 0.0)
     omega = float(np.sqrt(young * EDGE / (ratio * DENSITY * EDGE**3)))
     force = rest(sim, omega, REST, lambda: between(sim), 0.5, LEAST)[:, 0]
     blocks = force[: len(force) // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)

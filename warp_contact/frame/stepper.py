@@ -97,15 +97,27 @@ class Stepper:
             SimulationError: no step is stable, or the state does not stay finite; it is then that
                 of the last finished frame
         """
-        if self.rest and self.search is False:  # an overlap that is left has to be searched
-            if not self.rest.update(self._state, self.work):
-                self.rest.skip_frame(self._state, self.work)
-                return
+        if self._all_sleep():
+            return
         wp.copy(self._saved.x, self._state.x)
         wp.copy(self._saved.v, self._state.v)
         warm_start.copy(self._saved_warm, self.work.warm)
         while self.search is None or self.grow():
             self.search = overlaps(self._model, self._state, self.work)
+        self.dt, self.rates = self._find_step(frame)
+        self.search = self.search and bool(self.work.surface.was_old.numpy()[0])
+
+    def _all_sleep(self) -> bool:
+        """Decide who sleeps; where all do, nothing moves in this frame."""
+        if not self.rest or self.search is not False:  # an overlap that is left has to be searched
+            return False
+        if self.rest.update(self._state, self.work):
+            return False
+        self.rest.skip_frame(self._state, self.work)
+        return True
+
+    def _find_step(self, frame: int) -> tuple[float, tuple[float, float]]:
+        """Step the frame, again and again until its step fits; the step [s] and the last rates."""
         omega, rate = self.rates or self.spectrum.rates(self._state.x)
         self._pace.check(self._state, omega, frame)
         last, halved = self.n, 0
@@ -117,7 +129,7 @@ class Stepper:
             fits = not wrong and self._fits(dt, rate, after)
             flat = in_parts or bool(wrong) or self._flat()
             if fits and (in_parts or not flat):
-                break
+                return dt, after
             self._go_back()
             if wrong:
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
@@ -128,11 +140,7 @@ class Stepper:
                 least = CUT_SHORT if in_parts else RAISED
                 omega, rate = raised((omega, rate), after, dt, least)
             in_parts = flat
-        else:
-            raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
-        self.rates = after
-        self.dt = dt
-        self.search = self.search and bool(self.work.surface.was_old.numpy()[0])
+        raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
 
     def _look(self) -> tuple[tuple[float, float], str]:
         """Rates of the present state [1/s], and what is wrong with it: empty where nothing is."""

@@ -127,7 +127,7 @@ def count_down(
     # in, out
     steps: wp.array[int],  # (1,) steps that the frame still has: none when it has to be repeated
 ):
-    """One thread, at the end of a step."""
+    """One thread, at the end of a step: count it down."""
     steps[0] = steps[0] - 1
     for k in range(needed.shape[0]):
         if needed[k] > 0:

@@ -222,7 +222,7 @@ def closest_hit(
 @wp.func
 def corner_normal(
     i: int,
-    face: wp.vec3,  # area vector of the triangle that asks [m^2]
+    face: wp.vec3,  # area vector of the triangle itself [m^2]
     tris: wp.array[wp.vec3i],
     vs_start: wp.array[int],
     vs_tri: wp.array[int],

@@ -11,8 +11,8 @@ from warp_contact.data.work import Work
 def enlarged(work: Work) -> Capacity | None:
     """Twice what the frame would have needed, or None where all fitted.
 
-    Buffers more than half full grow too: lists grow together, and a frame is lost each time that one
-    does not fit.
+    Buffers more than half full grow too: lists grow together, and each time that one does not fit a
+    frame is lost.
     """
     needed = work.overflow.all.numpy()
     if not needed.any():

@@ -167,7 +167,7 @@ class Sleeping:
 
 
 def keep_forces(before: ContactForces, after: ContactForces) -> None:
-    """Copy the contact forces of the last frame, which bodies asleep still have, to a larger one."""
+    """Copy the contact forces of the last frame, which those asleep still have, to a larger one."""
     n = before.pair_key.shape[0]
     wp.copy(after.received, before.received)
     wp.copy(after.pair_key[:n], before.pair_key)

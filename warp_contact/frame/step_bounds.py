@@ -25,7 +25,7 @@ EXPLODED = 4.0  # times the frequency that the step was chosen for, at most
 REACH = 0.25  # of the thinnest body: the largest relative motion in a step
 PATIENCE = 2.0  # times the stable number of steps: more are not taken for TRAVEL or LINGERING
 BLURRED = 1.05  # times the stable step: the uncertainty of that
-LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 let some bodies pass
+LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 lets some pass
 KEEP = (
     0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
 )
@@ -69,7 +69,7 @@ def stays_stable(dt: float, omega: float, rate: float) -> bool:
 
 
 def stays_damped(dt: float, rate: float, after: float) -> bool:
-    """Whether stages and share for the damping ``rate`` [1/s] do for that ``after`` it too."""
+    """Whether stages and share for the damping ``rate`` [1/s] suffice for that ``after`` too."""
     return after * dt <= reach(stages_for(rate, dt), share_for(rate, dt))
 
 

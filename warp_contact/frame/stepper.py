@@ -160,7 +160,7 @@ class Stepper:
         return self.wanted is None and self.spectrum.flat
 
     def _fits(self, dt: float, rate: float, after: tuple[float, float]) -> bool:
-        """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] suit the rates ``after`` them."""
+        """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] fit the rates ``after`` them."""
         stable = self.wanted is not None or stays_stable(dt, after[0], rate)
         return stable and stays_damped(dt, rate, after[1])
 
@@ -228,8 +228,8 @@ class Stepper:
     ) -> tuple[float, tuple[float, float], str]:
         """Step the frame at the rates [1/s] given, after ``last`` steps.
 
-        Return the step [s] and what ``_look`` finds at the end. With ``in_parts`` the frame ends where
-        its step no longer fits. Where buffers were too small, nothing was found.
+        Return the step [s] and what ``_look`` finds at the end. With ``in_parts`` the frame ends as
+        soon as its step no longer fits. Where buffers were too small, nothing was found.
         """
         work = self.work
         if self.sleeping:

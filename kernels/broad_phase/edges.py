@@ -1,12 +1,12 @@
 """Edges and triangles that may come to cross: no axis separates them by more than both skins.
 
-Threads append what they find to a list in any order; pairs.py sorts it.
+Threads append the pairs that they find to a list in any order; pairs.py sorts it.
 """
 
 import warp as wp
 
 from warp_contact.kernels.broad_phase.bounds import next_in
-from warp_contact.kernels.broad_phase.near import MANY, Near, is_near, part, reaches
+from warp_contact.kernels.broad_phase.near import MANY, Near, is_near, piece, reaches
 from warp_contact.kernels.broad_phase.pairs import append
 from warp_contact.kernels.geometry import boxes_meet
 from warp_contact.kernels.mesh import Mesh
@@ -34,9 +34,9 @@ def gap_along(
 
 @wp.func
 def gap_to(p: wp.vec3, q: wp.vec3, t: wp.vec3i, enough: float, x: wp.array[wp.vec3]) -> float:
-    """Gap [m] of pq to triangle t along an axis of the separating axis theorem.
+    """Lower bound [m] on the distance of pq to triangle t, by the separating axis theorem.
 
-    Along the first axis with enough, else the largest: a distance that they keep.
+    The gap along the first axis where it exceeds ``enough``, else the largest gap of all axes.
     """
     a = x[t[0]]
     u = p - a
@@ -83,10 +83,10 @@ def visit_edges(
         return
     p = x[mesh.edges[e][0]]
     q = x[mesh.edges[e][1]]
-    own = part(p, p, q, q, skin[m])
+    own = piece(p, p, q, q, skin[m])
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
-            reach = skin[m] + skin[of.near[m, k]]
+            reach = skin[m] + skin[of.other[m, k]]
             if reaches(own, of.slab[m, k]):
                 other = of.part[m, k]
                 if boxes_meet(own.lo, own.hi, other.tri_lower, other.tri_upper):

@@ -157,7 +157,7 @@ def test_no_contact_approaches_further_than_its_gap(rng, stages, find_contacts, 
     print(f"worst {too_far.max():.1e} of an edge")
     # The sweeps end at their tolerance, or after 48 with some clusters of contacts to go: 3.4e-5 is
     # the worst of 30 draws.
-    assert np.median(too_far) < impulse.TOLERANCE and too_far.max() < 1e-3
+    assert np.median(too_far) < impulse.IMPULSE_TOLERANCE and too_far.max() < 1e-3
 
 
 def test_fixed_vertices_keep_their_velocity(rng, stages, find_contacts, records, jittered):
@@ -232,4 +232,4 @@ def test_contacts_are_left_alone_only_when_they_are_done(
     print(f"{n} contacts, alone {alone}, approach {approach / edge:.1e}")
     assert work.sweeps.number.numpy()[0] <= impulse.SWEEPS and max(alone[2:]) > n // 8
     # The last sweep, of all contacts at once, moves the vertices that they share once more.
-    assert approach < 5.0 * impulse.TOLERANCE * edge
+    assert approach < 5.0 * impulse.IMPULSE_TOLERANCE * edge

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, box
-from warp_contact.kernels.surface.residual import TOLERANCE
+from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
 from warp_contact.step import residual, search, surface
 
 EDGE = 0.25  # of a cell [m]
@@ -59,7 +59,7 @@ def test_a_small_overlap_is_closed_to_the_resting_gap(
     assert len(gap) > 0
     # What the passes stop at, and the rounding of coordinates of three edges. In one draw of 40 a
     # vertex that several contacts share has not got there after the last of them.
-    assert np.median(gap) > REST - TOLERANCE - 1e-5 and gap.min() > -5e-4
+    assert np.median(gap) > REST - CLOSURE_TOLERANCE - 1e-5 and gap.min() > -5e-4
     # Only contacts that others lifted end above it.
     assert gap.min() < REST + 1e-5
 
@@ -95,14 +95,14 @@ def test_a_deep_overlap_is_resolved_by_a_bounded_part(
     scene = stacked(rng, jittered, overlap=0.5 * EDGE)
     model, (x0, x1), _, c = closed(scene, stages, find_contacts, records)
     edge = edges_of(model, c)
-    used = c.residual > search.BOUND * edge
+    used = c.residual > search.SEARCH_BOUND * edge
     resolved = ((gaps(c, x1) - gaps(c, x0)) / edge)[used]
     assert used.sum() > 10
     # Everything by the bound at least, but for 5 % that the passes leave; what neighbours lift goes
     # further.
-    assert resolved.min() > 0.95 * search.BOUND
-    assert np.median(resolved) < 2.0 * search.BOUND
-    assert np.linalg.norm(x1 - x0, axis=1).max() < 4.0 * search.BOUND * edge.max()
+    assert resolved.min() > 0.95 * search.SEARCH_BOUND
+    assert np.median(resolved) < 2.0 * search.SEARCH_BOUND
+    assert np.linalg.norm(x1 - x0, axis=1).max() < 4.0 * search.SEARCH_BOUND * edge.max()
 
 
 def test_fixed_vertices_do_not_move_and_planes_stay_where_they_are(
@@ -150,12 +150,14 @@ def test_an_overlap_of_before_the_step_is_left_to_the_search(stages, find_contac
     moved = inner & (np.abs(moves) > 1e-3 * EDGE)
     down, up = -moves[moved & ~upper], moves[moved & upper]
     assert len(up) == len(down) == 9
-    if overlap < search.BOUND * EDGE:
+    if overlap < search.SEARCH_BOUND * EDGE:
         # Springs in series, but for strains of 0.01.
         np.testing.assert_allclose(up, overlap / (1.0 + ratio), atol=0.01 * overlap)
         np.testing.assert_allclose(down, overlap * ratio / (1.0 + ratio), atol=0.01 * overlap)
     else:
-        assert np.abs(moves).max() <= search.BOUND * model.body_edge.numpy().max() * (1.0 + 1e-3)
+        assert np.abs(moves).max() <= search.SEARCH_BOUND * model.body_edge.numpy().max() * (
+            1.0 + 1e-3
+        )
 
 
 def test_a_vertex_that_left_its_triangle_is_looked_at_again(rng, stages, find_contacts, jittered):

@@ -15,7 +15,7 @@ from verification.setup import Ask, facing, height
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import Work, allocate_work
 from warp_contact.step import broad_phase, residual, search, surface
-from warp_contact.step.look import look, look_at_vertices
+from warp_contact.step.detection import detect, detect_vertices
 from warp_contact.step.loop import step_of
 
 EDGE = 0.1  # of a block [m]
@@ -99,7 +99,7 @@ def settle(sim: wc.Simulation, work: Work) -> int:
     balanced = sim.response.search == "balanced"
     for call in range(CALLS):
         broad_phase.refresh(model, state.x, state.x, work)
-        (look if balanced else look_at_vertices)(model, state.x, state.x, work)
+        (detect if balanced else detect_vertices)(model, state.x, state.x, work)
         residual.find_gaps(model, state.x, work)
         if not work.surface.any_open.numpy()[0]:
             return call

@@ -11,23 +11,25 @@ from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import constraint, pair_impulses
 from warp_contact.kernels.impulse import impulse as kernels
+from warp_contact.kernels.lengths import IMPULSE_TOLERANCE
 from warp_contact.step import residual, sweeps, warm_start
 from warp_contact.step.contact_graph import order_by_vertex
 from warp_contact.step.narrow_phase import append_edge_contacts
 
 SWEEPS = 48  # at most; few clusters of contacts last so long
-TOLERANCE = 1e-5  # of an edge: an approach in one step that is left to the closure
-NEGLIGIBLE = 0.1  # of the tolerance, at the shortest edge: a change that changes no other contact
+NEGLIGIBLE = (
+    0.1  # of the tolerance, at the shortest edge: less does not affect other contacts
+)
 
 
 def solve(model: Model, state: State, work: Work) -> None:
-    """Change ``state.v`` by impulses at the contacts found, from those of the last step on."""
+    """Change ``state.v`` by impulses at the contacts found, starting from the last step's."""
     none = partial(warm_start.forget_edges, work)
     if_any(work.contacts.n, _solve_from_last, model, state, work, otherwise=none)
 
 
 def add_edges(model: Model, state: State, work: Work) -> None:
-    """Add the contacts of edges that were found since; those at hand keep their impulses."""
+    """Add the contacts of edges that were found since; the others keep their impulses."""
     if_any(work.narrow_phase.n_new, _add_edges, model, state, work)
 
 
@@ -52,7 +54,7 @@ def forget(work: Work) -> None:
 
 
 def begin(model: Model, x0: wp.array, work: Work) -> None:
-    """Order the contacts by vertex, and set what holds them; none has an impulse yet."""
+    """Order the contacts by vertex, and set their constants; none has an impulse yet."""
     _begin(model, x0, work, work.narrow_phase.none)
 
 
@@ -132,6 +134,6 @@ def _sweep(model: Model, v: wp.array, work: Work, last: bool = False) -> None:
 
 def _limits(work: Work) -> kernels.Limits:
     limits = kernels.Limits()
-    limits.tolerance, limits.sweeps = TOLERANCE, SWEEPS
-    limits.negligible = NEGLIGIBLE * TOLERANCE * work.mesh.edge
+    limits.tolerance, limits.sweeps = IMPULSE_TOLERANCE, SWEEPS
+    limits.negligible = NEGLIGIBLE * IMPULSE_TOLERANCE * work.mesh.edge
     return limits

@@ -1,4 +1,7 @@
-"""The end of a step: what still overlaps is moved onto a common surface. No motion comes of it."""
+"""The end of a step: residual overlaps are moved onto a common surface.
+
+These displacements do not become velocities.
+"""
 
 import math
 
@@ -9,16 +12,15 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.switches import on
 from warp_contact.data.work import Work
+from warp_contact.kernels.lengths import OLD_OVERLAP
 from warp_contact.kernels.surface import closure
-from warp_contact.kernels.surface.residual import DEEP
 from warp_contact.step import residual, search, sweeps
 from warp_contact.step.contact_graph import add_parts
-from warp_contact.step.look import look, look_apart
-from warp_contact.step.search import BOUND
+from warp_contact.step.detection import detect, detect_apart
 
 
 def close_gaps(model: Model, state: State, work: Work) -> None:
-    """Close what the impulses left, where bodies were apart when the step began."""
+    """Close the residual overlaps, where bodies were apart when the step began."""
     residual.add_gaps(model, state.x, work)
     if on("strays"):
         residual.add_strays(model, state.x, work)
@@ -26,7 +28,7 @@ def close_gaps(model: Model, state: State, work: Work) -> None:
 
 
 def resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
-    """Search the surface between bodies that overlapped before the step, close what is left."""
+    """Search the surface between bodies that overlapped before the step, then close the rest."""
     if not on("search"):
         return close_gaps(model, state, work)
     residual.add_gaps(model, state.x, work)
@@ -39,7 +41,7 @@ def close(model: Model, state: State, work: Work) -> None:
     Contacts that overlapped when the step began are left out. ``state.v`` changes only by what
     keeps the angular momentum.
     """
-    _close(model, state, work, float(DEEP) if on("old planes") else math.inf)
+    _close(model, state, work, OLD_OVERLAP if on("old planes") else math.inf)
 
 
 def close_all(model: Model, state: State, work: Work) -> None:
@@ -48,13 +50,12 @@ def close_all(model: Model, state: State, work: Work) -> None:
 
 
 def _close_gaps(model: Model, state: State, work: Work) -> None:
-    # No overlap can be older than the step: one that seems so has a wrong plane, and the look that
-    # follows may find a better one.
+    # No overlap can be older than the step. One that seems so has a wrong plane; the detection pass
+    # that follows may find a better one.
     close(model, state, work)
-    # Where vertices came to lie, their triangles may be others than before, and edges may cross
-    # that the narrow phase could not see.
+    # The closure may have moved vertices to other triangles, and edges across each other.
     if on("second look"):
-        look_apart(model, state.x, state.x, work)
+        detect_apart(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, close_all, model, state, work)
 
@@ -63,20 +64,20 @@ def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -
     if_any(work.surface.any_old, search.balance, model, state.x, work, iterations)
     close(model, state, work)
     if on("second look"):
-        look(model, state.x, state.x, work)
+        detect(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, close, model, state, work)
 
 
 def _close(model: Model, state: State, work: Work, deep: float) -> None:
-    """Leave contacts out that overlapped by more than ``deep``, of an edge, at the start."""
+    """Close all contacts but those that overlapped by more than ``deep`` edges at the start."""
     if not on("closure"):
         return
     c, s = work.contacts, work.surface
     launch_over(
         closure.begin_closure,
         work.capacity.contacts,
-        inputs=[BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
+        inputs=[search.SEARCH_BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
         outputs=[s.slack, s.push],
     )
     sweeps.repeat(work, _sweep, model, state.x, work)

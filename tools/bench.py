@@ -5,7 +5,7 @@
 
 Each case runs in a process of its own until there are contacts, then the same few steps again and
 again (a window, begun from the same state each time): as one captured graph, and uncaptured with a
-timer around every operation (``benching/stages.py``). Times are medians over the repeats, averaged
+timer around every operation (``clock/stages.py``). Times are medians over the repeats, averaged
 over the steps of the window; all are those of one step. On the CPU they are times of the thread,
 so that other processes on the machine hardly count; those of frames and starts are wall times.
 
@@ -47,11 +47,11 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
 import warp as wp
-from benching.cases import FRACTION, cases
-from benching.figures import figures, log_slope
-from benching.machine import write
-from benching.options import count
-from benching.start import start_times
+from clock.cases import FRACTION, cases
+from clock.figures import figures, log_slope
+from clock.machine import write
+from clock.options import count
+from clock.start import start_times
 
 START = "start"  # the case of the times until the first frame
 OVERHEAD = "squeezed_sphere"

@@ -30,12 +30,12 @@ from time import perf_counter
 
 import numpy as np
 import warp as wp
-from benching.crowd import blocks, rows
-from benching.figures import log_slope, step_figures
-from benching.machine import write
-from benching.options import count
-from benching.stages import STAGES
-from benching.window import Timing, measure
+from clock.crowd import blocks, rows
+from clock.figures import log_slope, step_figures
+from clock.machine import write
+from clock.options import count
+from clock.stages import STAGES
+from clock.window import Timing, measure
 
 from warp_contact import Simulation
 

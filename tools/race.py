@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 import warp as wp
-from charting import methods, ours, outside
-from charting.panel import Failed, Motion, Panel
+from chart import methods, ours, outside
+from chart.panel import Failed, Motion, Panel
 from checks.scenes import in_edges
 from pareto import cpu, versions
 

@@ -14,8 +14,8 @@ from importlib import import_module
 from pathlib import Path
 
 import warp as wp
-from stable.outcome import MISSED, classify, level
-from stable.setup import METHODS, attempt
+from trials.outcome import MISSED, classify, level
+from trials.setup import METHODS, attempt
 
 FAMILIES = {
     "limits": "B10 what the method was not made for",
@@ -49,7 +49,7 @@ def main() -> int:
     args = parser.parse_args()
     wp.config.log_level = wp.LOG_WARNING
     if args.part == "map":
-        from stable import chart, sweeps
+        from trials import chart, sweeps
 
         check(parser, args.names, sweeps.SWEEPS)
         return chart.draw(args.names or list(sweeps.SWEEPS), args.quick, args.out)
@@ -72,7 +72,7 @@ def show(families: list[str], args) -> int:
     print(f"response {args.response}\n{line}\n{'-' * len(line)}")
     missed = 0
     for family in families:
-        for case in import_module(f"stable.{family}").cases(args.quick):
+        for case in import_module(f"trials.{family}").cases(args.quick):
             if args.only not in case.name:
                 continue
             r = attempt(case.build, args.response, limit=case.limit)

@@ -1,0 +1,119 @@
+"""Sweeps of two numbers to the point of failure, on scenes of two small bodies."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+import warp_contact as wc
+from trials.case import DOWN, NONE, UP, soft
+from trials.watch import Setting
+
+COARSE, FINE = 5, 11  # cells along each side
+EDGE = 0.1  # of a block [m]
+FRAMES = 60
+MOST_STEPS = 600, 6000  # of a cell in a quick and in a full run; a run that is cut says so
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One sweep.
+
+    Attributes:
+        title: what is swept
+        x_name, y_name: what the axes are, with their units
+        x, y: first and last value of both, spaced by equal factors
+        build: the setting of a cell
+        limit: where something else than contact decides: its name, and y at each x
+    """
+
+    title: str
+    x_name: str
+    y_name: str
+    x: tuple[float, float]
+    y: tuple[float, float]
+    build: Callable[[float, float], Setting]
+    limit: tuple[str, Callable[[np.ndarray], np.ndarray]] | None = None
+
+    def axes(self, quick: bool) -> tuple[np.ndarray, np.ndarray]:
+        """The values of both."""
+        n = COARSE if quick else FINE
+        return np.geomspace(*self.x, n), np.geomspace(*self.y, n)
+
+
+def step_stiffness(step: float, young: float) -> Setting:
+    """Two blocks collide at 1 m/s with a fixed step."""
+    scene = wc.Scene(NONE, friction=0.3)
+    for k, sign in enumerate((-1.0, 1.0)):
+        place = 0.004 * k, 0.003 * k, sign * (0.5 * EDGE + 0.002)
+        scene.add_body(wc.box(EDGE, 2 + k), soft(young), place, velocity=(0.0, 0.0, -0.5 * sign))
+    return fixed_steps(scene, 0.06, step)
+
+
+def mass_stiffness(mass: float, young: float) -> Setting:
+    """A block falls on one that is held; mass and stiffness of the upper over that of the lower.
+
+    At the largest mass ratio the pressure at rest is as large as the lower block's modulus. The
+    weight of the upper block over its section is mass / (1e4 young) of its own moduli.
+    """
+    scene = wc.Scene(DOWN, friction=0.3)
+    base = 1e4 * 1000.0 * 9.81 * EDGE
+    low = wc.box(EDGE, 2)
+    held = low.vertices[:, 2] < -0.049
+    scene.add_body(low, soft(base), fixed=held)
+    high = soft(base * young, 1000.0 * mass)
+    scene.add_body(wc.box(EDGE, 3), high, (0.004, 0.003, EDGE + 2e-3))
+    return Setting(scene, 0.1, FRAMES / 0.1, pairs=((0, 1, UP),))
+
+
+def overlap_thickness(overlap: float, thick: float) -> Setting:
+    """A block starts in a plate; both lengths as parts of its edge.
+
+    Where the overlap is above the thickness it sticks out of the far face.
+    """
+    scene = wc.Scene(NONE, friction=0.0)
+    young = 1e5
+    scene.add_body(wc.box((2.0 * EDGE, 2.0 * EDGE, thick * EDGE), (4, 4, 1)), soft(young))
+    place = 0.004, 0.003, (0.5 * thick + 0.5 - overlap) * EDGE
+    scene.add_body(wc.box(EDGE, 3), soft(young), place)
+    return Setting(scene, 0.3, FRAMES / 0.3, pairs=((0, 1, UP),), recovers=True)
+
+
+def speed_step(speed: float, step: float) -> Setting:
+    """A block hits a thin plate that is held, with a fixed step."""
+    scene = wc.Scene(NONE, friction=0.3)
+    thick, length = 0.004, 0.04
+    scene.add_body(wc.box((EDGE, EDGE, thick), (3, 3, 1)), soft(1e4), fixed=True)
+    place = 0.003, 0.002, 0.5 * (thick + length) + 0.6 * thick
+    scene.add_body(wc.box(length, 2), soft(1e4), place, velocity=(0.0, 0.0, -speed))
+    way = max(3.0 * length / speed, 10.0 * step)
+    return fixed_steps(scene, min(way, 600.0 * step), step)
+
+
+def fixed_steps(scene: wc.Scene, seconds: float, step: float) -> Setting:
+    """About ``FRAMES`` frames of equal steps of ``step`` [s]."""
+    substeps = max(1, round(seconds / FRAMES / step))
+    return Setting(scene, seconds, 1.0 / (step * substeps), substeps, pairs=((0, 1, UP),))
+
+
+SWEEPS = {
+    "step": Sweep(
+        "two blocks collide at 1 m/s, fixed step",
+        *("step [s]", "Young's modulus [Pa]", (1e-4, 1e-2), (1e3, 1e7), step_stiffness),
+    ),
+    "ratio": Sweep(
+        "a block falls on another, step left to the solver",
+        *("mass ratio", "stiffness ratio", (1.0, 1e4), (1e-4, 1e4), mass_stiffness),
+        # Between the cells where it goes inside out, also if held at its base, and those where not.
+        limit=("the upper block's weight is 25 of its moduli", lambda mass: mass / 2.5e5),
+    ),
+    "depth": Sweep(
+        "a block starts in a plate",
+        *("overlap at the start [of an edge]", "thickness [of an edge]"),
+        *((0.01, 0.5), (0.03, 1.0), overlap_thickness),
+    ),
+    "speed": Sweep(
+        "a block hits a plate of 0.004 m, fixed step",
+        *("speed [m/s]", "step [s]", (0.1, 100.0), (1e-4, 1e-2), speed_step),
+    ),
+}

@@ -9,6 +9,7 @@ coefficient for all.
 from functools import cache
 
 import numpy as np
+from engines.task import Failed, Motion, Task
 from verification import collision, hertz
 from verification import ladder as mass_ladder
 from verification.setup import G, on_face
@@ -16,7 +17,6 @@ from verification.setup import G, on_face
 import warp_contact as wc
 from chart.laws import STEPS, squeeze
 from chart.panel import Panel, late, sound
-from engines.task import Failed, Motion, Task
 
 Shown = tuple[Task, list[Panel]]
 ZETA = 0.35  # damping ratio of the slowest mode, where bodies come to rest

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from engines.task import Failed, Motion, Numbered, Task
 
 from chart.laws import Elastic
-from engines.task import Failed, Motion, Numbered, Task
 
 TUNNELLED = 1.0  # of an edge: an overlap from which a body is on the wrong side
 INVERTED = 0.0  # volume ratio at the end

@@ -81,17 +81,18 @@ def draw_summary(path: Path, points: list[Point]) -> None:
     known = {p.method for p in points}
     handles = _legend({m: style[2] for m, style in STYLES.items() if m in known}, 9.0)
     handles += [
-        Line2D([], [], color="0.5", marker="o", ls="", alpha=look.faint, label="beaten by its own line"),
-        Line2D([], [], color="0.5", marker="o", ls="", mfc="none", label="a run that failed"),
+        Line2D([], [], color="black", lw=6, alpha=0.12, label="the best of all"),
+        Line2D([], [], color="0.5", marker="o", ls="", alpha=2 * look.faint, label="off its line"),
+        Line2D([], [], color="0.5", marker="o", ls="", mfc="none", label="failed"),
     ]
     title = "Error against computing time, same meshes and masses for all; lower left is better"
     figure.suptitle(title, fontsize=15)
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=12, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=6, fontsize=12, frameon=False)
     figure.savefig(path, dpi=100)
     plt.close(figure)
 
 
-def panel(ax, title: str, points: list[Point], look: Look = Look()) -> None:  # noqa: B008
+def panel(ax, title: str, points: list[Point], look: Look = Look()) -> None:
     """Points, the front of each method, that of all, and the rail."""
     ax.set_xscale("log")
     ax.set_yscale("log")

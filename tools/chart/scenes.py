@@ -15,13 +15,13 @@ from functools import cache, partial
 import numpy as np
 import warp as wp
 from checks.scenes import in_edges
+from engines import ours
+from engines.settings import DEFAULT
+from engines.task import Failed, Motion, Numbered, Task
 
 import warp_contact as wc
 from chart.distance import distance
 from chart.panel import TUNNELLED, Panel, late, sound
-from engines import ours
-from engines.settings import DEFAULT
-from engines.task import Failed, Motion, Numbered, Task
 from warp_contact import scenes
 
 FPS = 60
@@ -42,14 +42,14 @@ def scene(name: str, quick: bool) -> tuple[Task, list[Panel]]:
     """A scene of the paper: overlap and gap, its overlap alone, its motion."""
     module = scenes.load(name)
     frames = round((QUICK if quick else DURATION) * FPS)
-    title = f"{TITLES[name]}\n{{}} [of an edge]"
-    says = "overlap, or gap where bodies press on each other"
-    alone, way = "overlap alone, which a margin hides", "distance from a converged run, rms of all"
-    pressed = PRESSED[name]
+    errors = {
+        "": ("overlap, or gap where bodies press on each other", apart),
+        " overlap": ("overlap alone, which a margin hides", inside),
+        " motion": ("distance from a converged run, rms of all vertices and frames", astray),
+    }
     panels = [
-        Panel(name, title.format(says), partial(apart, pressed)),
-        Panel(f"{name} overlap", title.format(alone), partial(inside, pressed)),
-        Panel(f"{name} motion", title.format(f"{way} vertices and frames"), partial(astray, pressed)),
+        Panel(name + end, f"{TITLES[name]}\n{title} [of an edge]", partial(error, PRESSED[name]))
+        for end, (title, error) in errors.items()
     ]
     return Task(module.build, FPS, frames, **module.PENALTY), panels
 
@@ -96,7 +96,7 @@ def deepest(task: Task, motion: Motion) -> float:
 
 
 def overlaps(task: Task, motion: Motion):
-    """After each frame the deepest overlap, in edges of the finer body, and all that is measured."""
+    """After each frame the deepest overlap, in edges of the finer body, and the whole measure."""
     sim = wc.Simulation(task.scene(), fps=task.fps)
     for x in motion.x:
         sim.state.x.assign(np.ascontiguousarray(x, dtype=np.float32))

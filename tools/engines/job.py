@@ -33,6 +33,7 @@ def main(make) -> None:
             result = {"reason": f"cannot represent the scene: {error}"}
         except Exception as error:
             result = {"reason": f"{type(error).__name__}: {error}".splitlines()[0]}
+        result |= {name: result[name].astype(float) for name in ("x", "v") if name in result}
         part = folder / f"part{k}.npz"
         np.savez(part, **{"reason": "", **result})
         part.rename(folder / f"result{k}.npz")
@@ -69,7 +70,8 @@ def play(make, fps: float, frames: int, stop: int | None, limit: float) -> dict:
         if not np.isfinite(states[-1][0]).all():
             return {"reason": f"not finite after frame {frame}", "wall": rate}
         if wall > limit and frame < frames:
-            return {"reason": f"too slow: {frame} of {frames} frames in {limit:.3g} s", "wall": rate}
+            reason = f"too slow: {frame} of {frames} frames in {limit:.3g} s"
+            return {"reason": reason, "wall": rate}
     x, v = map(np.array, zip(*states, strict=True))
     return {"x": x, "v": v, "wall": rate, "startup": startup, "steps": engine.steps}
 

@@ -10,7 +10,7 @@ import warp_contact as wc
 from engines.job import play
 from engines.settings import Own
 from engines.task import Failed, Motion, Task
-from warp_contact import solver
+from warp_contact.step import step
 
 
 class Engine:
@@ -54,7 +54,7 @@ def run(task: Task, setting: Own, substeps: int | None, limit: float) -> Motion:
         limit: wall seconds after which the run is given up
     """
     make = partial(Engine, task, setting.response(task), substeps)
-    still = nullcontext() if setting.surfaces else mock.patch.object(solver, "move_surfaces")
+    still = nullcontext() if setting.surfaces else mock.patch.object(step, "move_surfaces")
     with still:
         try:
             found = play(make, task.fps, task.frames, task.stop, limit)

@@ -1,15 +1,13 @@
 """B11: input on the border of what has a meaning: it runs, or is refused before the first step."""
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
 import warp_contact as wc
-from trials.case import DOWN, NONE, UP, Case, soft
 from trials.outcome import BEYOND, FINE, REFUSED
 from trials.pieces import UPSIDE_DOWN, tip
-from trials.watch import Setting
+from trials.setting import DOWN, NONE, UP, Case, Setting, body, case, setting, soft
 
 EDGE = 0.1  # [m]
 
@@ -18,32 +16,30 @@ def cases(quick: bool) -> Iterator[Case]:
     """What has to run, then what has to be refused."""
     for name, aside in (("aligned", 0.0), ("shifted by half a cell", 0.25 * EDGE)):
         for gap in (0.0, -1e-12, -1e-6, 1e-6):
-            yield Case(f"B11 faces {name}, gap {gap:g}", partial(pair, gap=gap, aside=aside))
-    yield Case("B11 corner exactly on a corner", partial(pair, aside=EDGE))
-    yield Case("B11 vertex exactly on a face", partial(on_tip, 0.0, 0.0))
-    yield Case("B11 vertex exactly on an edge", partial(on_tip, 0.25 * EDGE, 0.0))
-    yield Case("B11 vertex exactly on a vertex", partial(on_tip, 0.0, 0.0, 2))
-    yield Case("B11 equal bodies in one place", partial(pair, gap=-EDGE), BEYOND)
-    yield Case("B11 sliver tet of aspect 1000", partial(sliver, 1e3))
-    yield Case("B11 sliver tet of aspect 1e+06", partial(sliver, 1e6), BEYOND)
-    yield Case("B11 inverted tets at the start", pulled_through)
+            yield case(f"B11 faces {name}, gap {gap:g}", pair, gap=gap, aside=aside)
+    yield case("B11 corner exactly on a corner", pair, aside=EDGE)
+    yield case("B11 vertex exactly on a face", on_tip)
+    yield case("B11 vertex exactly on an edge", on_tip, 0.25 * EDGE)
+    yield case("B11 vertex exactly on a vertex", on_tip, cells=2)
+    yield case("B11 equal bodies in one place", pair, gap=-EDGE, expect=BEYOND)
+    yield case("B11 sliver tet of aspect 1000", sliver, 1e3)
+    yield case("B11 sliver tet of aspect 1e+06", sliver, 1e6, expect=BEYOND)
+    yield case("B11 inverted tets at the start", pulled_through)
     for far in (1e1, 1e2, 1e3) if quick else (1e1, 1e2, 1e3, 1e5, 1e7):
         expect = FINE if far < 2e3 else BEYOND
-        yield Case(f"B11 {far:g} m from the origin", partial(pair, far=far), expect)
+        yield case(f"B11 {far:g} m from the origin", pair, far=far, expect=expect)
     for scale in (1e-3, 1.0, 1e3):
-        yield Case(f"B11 lengths times {scale:g}", partial(pair, scale=scale))
+        yield case(f"B11 lengths times {scale:g}", pair, scale=scale)
     for young in (1e2, 1e6, 1e9) if quick else (1e2, 1e6, 1e9, 1e12):
-        yield Case(
-            f"B11 E {young:g}", partial(pair, young=young, v=5e-4 * young**0.5, gravity=NONE)
-        )
+        yield case(f"B11 E {young:g}", pair, young=young, v=5e-4 * young**0.5, gravity=NONE)
     for density in (1e-2, 1e5):
-        yield Case(f"B11 density {density:g}", partial(pair, density=density, young=100 * density))
+        yield case(f"B11 density {density:g}", pair, density=density, young=100 * density)
     for poisson in (0.0, 0.49, 0.499):
-        yield Case(f"B11 Poisson ratio {poisson:g}", partial(pair, poisson=poisson))
+        yield case(f"B11 Poisson ratio {poisson:g}", pair, poisson=poisson)
     for friction in (0.0, 1.0, 10.0):
-        yield Case(f"B11 friction {friction:g}", partial(pair, friction=friction))
-    yield Case("B11 gravity 0, at rest", partial(pair, v=0.0, gravity=NONE))
-    yield Case("B11 all vertices fixed", partial(pair, fixed=True))
+        yield case(f"B11 friction {friction:g}", pair, friction=friction)
+    yield case("B11 gravity 0, at rest", pair, v=0.0, gravity=NONE)
+    yield case("B11 all vertices fixed", pair, v=0.0, fixed=True)
     yield from refusals()
 
 
@@ -65,77 +61,68 @@ def refusals() -> Iterator[Case]:
         "a tet of aspect 1e8": (tip().vertices * [1.0, 1.0, 1e-8], [[0, 1, 2, 3]]),
     }
     for name, mesh in meshes.items():
-        yield Case(f"B11 {name}", partial(body, mesh), REFUSED)
-    yield Case("B11 no bodies", lambda: Setting(wc.Scene(), 0.1), REFUSED)
-    yield Case("B11 fps 0", lambda: Setting(pair().scene, 0.1, fps=0.0), REFUSED)
-    yield Case("B11 fps infinite: a step of 0", infinite_rate, REFUSED)
-    yield Case("B11 NaN in a velocity", partial(pair, v=np.nan), REFUSED)
-    yield Case("B11 NaN in gravity", partial(pair, gravity=(0.0, 0.0, np.nan)), REFUSED)
-    yield Case("B11 Poisson ratio 0.5", partial(pair, poisson=0.5), REFUSED)
-    yield Case("B11 density 0", partial(pair, density=0.0), REFUSED)
-    yield Case("B11 E 0", partial(pair, young=0.0), REFUSED)
+        yield case(f"B11 {name}", alone, mesh, expect=REFUSED)
+    yield case("B11 no bodies", setting, seconds=0.1, expect=REFUSED)
+    yield case("B11 fps 0", pair, fps=0.0, expect=REFUSED)
+    yield case("B11 fps infinite: a step of 0", pair, fps=float("inf"), expect=REFUSED)
+    yield case("B11 NaN in a velocity", pair, v=np.nan, expect=REFUSED)
+    yield case("B11 NaN in gravity", pair, gravity=(0.0, 0.0, np.nan), expect=REFUSED)
+    yield case("B11 Poisson ratio 0.5", pair, poisson=0.5, expect=REFUSED)
+    yield case("B11 density 0", pair, density=0.0, expect=REFUSED)
+    yield case("B11 E 0", pair, young=0.0, expect=REFUSED)
 
 
 def pair(
-    gap=1e-3,
-    aside=0.0,
-    far=0.0,
-    scale=1.0,
-    young=1e5,
-    density=1000.0,
-    poisson=0.3,
-    friction=0.3,
-    v=0.5,
+    gap: float = 1e-3,
+    aside: float = 0.0,
+    far: float = 0.0,
+    scale: float = 1.0,
+    v: float = 0.5,
     gravity=DOWN,
-    fixed=None,
+    friction: float = 0.3,
+    fixed: bool | str = "base",
+    fps: float | None = None,
+    **material,
 ) -> Setting:
     """A cube comes down on one that is held; lengths, speed and time scale together."""
-    g = np.array(gravity) * (1.0 if scale == 1.0 else 1.0 / scale)
-    scene = wc.Scene(g, friction=friction)
-    material = soft(young, density, poisson)
-    low, high = (wc.box(scale * EDGE, 2) for _ in range(2))
-    held = True if fixed else low.vertices[:, 2] < -0.49 * scale * EDGE
+    rubber = soft(**{"young": 1e5, "density": 1000.0, "poisson": 0.3} | material)
     at = np.array([far, 0.0, 0.0])
-    scene.add_body(low, material, at, fixed=held, label="low")
     place = at + scale * np.array([aside, aside, EDGE + gap])
-    scene.add_body(high, material, place, velocity=(0.0, 0.0, -v), fixed=fixed, label="high")
-    if fixed:
-        scene.bodies[1].v[:] = 0.0
-    period = 2.0 * EDGE * np.sqrt(density / young) if young > 0.0 and density > 0.0 else 1.0
-    return Setting(scene, 8.0 * scale * period, 5.0 / (scale * period), pairs=((0, 1, UP),))
+    low = body(wc.box(scale * EDGE, 2), rubber, at, fixed=fixed, label="low")
+    held = True if fixed is True else None
+    high = body(wc.box(scale * EDGE, 2), rubber, place, v=-v, fixed=held, label="high")
+    period = scale
+    if rubber.youngs_modulus > 0.0 and rubber.density > 0.0:
+        period *= 2.0 * EDGE * np.sqrt(rubber.density / rubber.youngs_modulus)
+    run = {"seconds": 8.0 * period, "fps": 5.0 / period if fps is None else fps}
+    return setting(low, high, gravity=np.array(gravity) / scale, friction=friction, **run)
 
 
-def on_tip(aside: float, along: float, cells: int = 1) -> Setting:
+def on_tip(aside: float = 0.0, cells: int = 1) -> Setting:
     """A tet stands on its tip on a face, an edge or a vertex of a block, at distance zero."""
-    scene = wc.Scene(DOWN, friction=0.3)
-    low = wc.box(EDGE, cells)
-    shift = 0.5 * EDGE - aside if aside else 0.0
-    scene.add_body(low, soft(), (0.0, 0.0, -0.5 * EDGE), fixed=low.vertices[:, 2] < -0.049)
-    scene.add_body(tip(EDGE), soft(), (shift if cells == 1 else 0.0, along, 0.0), UPSIDE_DOWN)
-    return Setting(scene, 0.15, pairs=((0, 1, UP),))
+    low = body(wc.box(EDGE, cells), at=-0.5 * EDGE, fixed="base")
+    place = 0.5 * EDGE - aside if aside else 0.0, 0.0, 0.0
+    return setting(low, body(tip(EDGE), at=place, turn=UPSIDE_DOWN), seconds=0.15)
 
 
 def sliver(aspect: float) -> Setting:
     """A flat tet falls on the ground; its step is as short as it is thin."""
-    scene = wc.Scene(DOWN, friction=0.3)
-    scene.add_plane(UP)
-    mesh = tip(EDGE).scaled(1.0, 1.0, 1.0 / aspect)
-    scene.add_body(mesh, soft(), (0.0, 0.0, 2.0 * EDGE / aspect))
-    return Setting(scene, 200.0 * EDGE / aspect / 10.0, 100.0 * aspect)
+    flat = body(tip(EDGE).scaled(1.0, 1.0, 1.0 / aspect), at=2.0 * EDGE / aspect)
+    seconds = 200.0 * EDGE / aspect / 10.0
+    return setting(flat, planes=[UP], seconds=seconds, fps=100.0 * aspect)
 
 
 def pulled_through() -> Setting:
     """A cube with some tets inside out: before the first step a corner moves through its middle."""
-    scene = wc.Scene(NONE)
-    body = scene.add_body(wc.box(EDGE, 2), wc.NeoHookean(1e5, 0.4, 1000.0, 1e-3))
 
     def drive(sim: wc.Simulation) -> None:
         if sim.frame == 0:
-            x = sim.positions(body)
+            x = sim.positions(0)
             x[0] *= -0.6
             sim.state.x.assign(x)
 
-    return Setting(scene, 0.2, drive=drive)
+    cube = body(wc.box(EDGE, 2), wc.NeoHookean(1e5, 0.4, 1000.0, 1e-3))
+    return setting(cube, gravity=NONE, seconds=0.2, drive=drive)
 
 
 def folded():
@@ -145,15 +132,6 @@ def folded():
     return mesh.vertices + np.where(middle[:, None], [0.0, 0.0, EDGE], 0.0), mesh.tets
 
 
-def body(mesh) -> Setting:
+def alone(mesh) -> Setting:
     """A body of these vertices and tets."""
-    scene = wc.Scene(DOWN)
-    scene.add_body(wc.TetMesh(*mesh), soft())
-    return Setting(scene, 0.1)
-
-
-def infinite_rate() -> Setting:
-    """Frames without an end."""
-    setting = pair()
-    setting.fps = float("inf")
-    return setting
+    return setting(body(wc.TetMesh(*mesh)), seconds=0.1)

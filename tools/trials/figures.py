@@ -1,13 +1,17 @@
-"""B4 to B7: the scenes of the paper as they are, the sphere squeezed further, part of the bowl."""
+"""The scenes of the paper as they are, the sphere squeezed further; blocks that no one chose.
+
+``tilts`` are the collisions of ``checks/collision.py`` with rotation, place, cells and stiffness
+drawn anew for each number. Corners slide over facets that they bend, and pass each other tip on
+tip.
+"""
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
+from checks import collision
 
 import warp_contact as wc
-from trials.case import UP, Case
-from trials.watch import Setting
+from trials.setting import Case, Setting, case
 from warp_contact import scenes
 
 FPS = 60.0
@@ -15,28 +19,44 @@ SQUEEZES = 0.7, 0.5, 0.3, 0.15  # of the sphere's diameter
 SPEED = 0.1  # of the upper cube [m/s]
 REST = 0.2  # between squeeze and release [s]
 LIMIT = 600.0  # seconds that the larger scenes may take
+SIDE_BY_SIDE = (0, 1), (2, 3)  # pairs of bodies
+
+DRAWS, QUICK_DRAWS = 180, 12
+CELLS = (3, 3), (2, 5), (4, 6), (8, 8)
+ASIDE = 0.03  # the largest shift along x and y [m]
 
 
 def cases(quick: bool) -> Iterator[Case]:
-    """Every one; the quick run is shorter and takes fewer fruits."""
-    seconds = 0.5 if quick else 2.0
-    yield Case("B4 three cubes on a membrane", partial(membrane, seconds))
+    """B4 to B7; the quick run is shorter and takes fewer fruits."""
+    seconds, fraction = (0.5, 0.05) if quick else (2.0, 0.15)
+    on_sheet = (0, 1), (0, 2), (0, 3)
+    yield case("B4 three cubes on a membrane", paper, "cubes_on_membrane", seconds, on_sheet)
     for part in SQUEEZES[:2] if quick else SQUEEZES:
-        yield Case(f"B5 sphere squeezed to {part:.0%} and released", partial(squeezed, part))
-    for friction in (0.3, 0.0):
-        name = f"B6 stack of nine membranes, friction {friction:g}"
-        yield Case(name, partial(stack, 0.25 * seconds, friction), limit=LIMIT)
-    fraction = 0.05 if quick else 0.15
+        yield case(f"B5 sphere squeezed to {part:.0%} and released", squeezed, part)
+    for mu in (0.3, 0.0):
+        name = f"B6 stack of nine membranes, friction {mu:g}"
+        yield case(name, paper, "membrane_stack", 0.25 * seconds, limit=LIMIT, friction=mu)
     name = f"B7 bowl, {fraction:.0%} of the fruit"
-    yield Case(name, partial(bowl, 0.25 * seconds, fraction), limit=LIMIT)
-    yield Case("Fig. 1 arches on slabs", partial(arches, seconds), limit=LIMIT)
-    yield Case("Fig. 6 two pairs of blocks", partial(blocks, seconds))
+    yield case(name, paper, "bowl", 0.25 * seconds, (), limit=LIMIT, fraction=fraction)
+    yield case("Fig. 1 arches on slabs", paper, "sampling", seconds, SIDE_BY_SIDE, limit=LIMIT)
+    yield case("Fig. 6 two pairs of blocks", blocks, seconds)
 
 
-def membrane(seconds: float) -> Setting:
-    """Cubes of masses 1 : 4 : 16."""
-    pairs = tuple((0, k, UP) for k in (1, 2, 3))
-    return Setting(scenes.load("cubes_on_membrane").build(), seconds, FPS, pairs=pairs)
+def tilts(quick: bool) -> Iterator[Case]:
+    """So many draws; the number of each is its seed."""
+    for k in range(QUICK_DRAWS if quick else DRAWS):
+        yield case(f"B2 blocks at random tilt {k}", collide, k)
+
+
+def paper(name: str, seconds: float, pairs: tuple | None = None, **options) -> Setting:
+    """A scene as it is; ``options`` of its ``build``."""
+    return Setting(scenes.load(name).build(**options), seconds, FPS, pairs=pairs)
+
+
+def blocks(seconds: float) -> Setting:
+    """Blocks that start in each other; their outer ends are held."""
+    scene = scenes.load("two_bodies").build()
+    return Setting(scene, seconds, FPS, pairs=SIDE_BY_SIDE, recovers=True)
 
 
 def squeezed(part: float) -> Setting:
@@ -52,28 +72,15 @@ def squeezed(part: float) -> Setting:
         waiting, up = sim.time >= down, sim.time >= down + REST
         sim.set_velocity(upper, (0.0, 0.0, SPEED * (up - (not waiting))), held)
 
-    pairs = (0, 1, UP), (1, 2, UP)
-    return Setting(scene, 2.0 * down + REST, FPS, pairs=pairs, drive=drive)
+    return Setting(scene, 2.0 * down + REST, FPS, drive=drive)
 
 
-def stack(seconds: float, friction: float) -> Setting:
-    """Nine membranes fall on each other."""
-    return Setting(scenes.load("membrane_stack").build(friction=friction), seconds, FPS)
-
-
-def bowl(seconds: float, fraction: float) -> Setting:
-    """Fruits fall into a dish."""
-    return Setting(scenes.load("bowl").build(fraction=fraction), seconds, FPS, pairs=())
-
-
-def arches(seconds: float) -> Setting:
-    """A coarse arch on a fine slab, a fine one on a coarse one."""
-    pairs = (0, 1, UP), (2, 3, UP)
-    return Setting(scenes.load("sampling").build(), seconds, FPS, pairs=pairs)
-
-
-def blocks(seconds: float) -> Setting:
-    """Blocks that start in each other; their outer ends are held."""
-    pairs = (0, 1, UP), (2, 3, UP)
-    scene = scenes.load("two_bodies").build()
-    return Setting(scene, seconds, FPS, pairs=pairs, recovers=True)
+def collide(k: int) -> Setting:
+    """Draw ``k``."""
+    rng = np.random.default_rng(k)
+    cells = CELLS[rng.integers(len(CELLS))]
+    ratio = rng.choice(collision.RATIOS)
+    angles = rng.uniform(0.0, 90.0, 3)
+    shift = np.array([*rng.uniform(-ASIDE, ASIDE, 2), 0.0])
+    scene = collision.build(*cells, ratio, "tilted shifted", angles=angles, shift=shift)
+    return Setting(scene, collision.DURATION, collision.FPS, pairs=())

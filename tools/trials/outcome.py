@@ -1,5 +1,8 @@
 """What became of a run: the figures of it, one word for it, the level it holds.
 
+A type of its own beside ``measure.figure.Figure``: a run is judged by all of its figures together,
+the first that fails names the outcome.
+
     fine        none of the following
     refused     an error before the first step
     not finite  a position or velocity is not a number
@@ -15,16 +18,17 @@ A run has the first of these that applies, in the order refused, not finite, sto
 
 from dataclasses import dataclass
 
+from measure.figure import EXCELLENT, GOOD, MISSED
+
 FINE, REFUSED, INFINITE, STOPPED = "fine", "refused", "not finite", "stopped"
 LOST, INVERTED, ENERGY, OVERLAP = "lost", "inverted", "energy", "overlap"
 OUTCOMES = FINE, OVERLAP, ENERGY, INVERTED, LOST, STOPPED, INFINITE, REFUSED
 
 SUNK = 0.05  # overlap, of the smallest extent of a body
-GAIN = 0.01  # energy, of its scale: see trials.watch.Watch
+GAIN = 0.01  # energy, of its scale: see watch.py
 FLAT = 0.0  # volume of a tet at the end, of that at rest
 EXCELLENT_SUNK, EXCELLENT_GAIN = 0.01, 0.001  # and no tet inverts on the way
 BEYOND = "beyond"  # expected of what has a meaning, but not for this method
-MISSED, GOOD, EXCELLENT = "-", "good", "excellent"
 
 
 @dataclass
@@ -69,10 +73,9 @@ class Record:
     @property
     def reason(self) -> str:
         """What there is to say beyond the outcome."""
-        passed = ""
-        if self.through:
-            passed = "{} points, of {} through {}".format(self.tunnelled, *self.through)
-        return self.refused or self.error or self.lost or passed or self.note
+        passed = "{} points, of {} through {}".format(self.tunnelled, *self.through or ("", ""))
+        said = self.refused, self.error, self.lost, passed if self.through else ""
+        return next(filter(None, said), self.note)
 
 
 def classify(r: Record) -> str:

@@ -4,7 +4,8 @@ import numpy as np
 
 import warp_contact as wc
 
-UPSIDE_DOWN = 1.0, 0.0, 0.0, 0.0  # half a turn about x, as a quaternion (x, y, z, w)
+AS_IS = 0.0, 0.0, 0.0, 1.0  # quaternions (x, y, z, w)
+UPSIDE_DOWN = 1.0, 0.0, 0.0, 0.0  # half a turn about x
 
 
 def about(axis: str, degrees: float) -> np.ndarray:
@@ -16,9 +17,8 @@ def about(axis: str, degrees: float) -> np.ndarray:
 def both(second, first) -> np.ndarray:
     """The quaternion of two turns, ``first`` before ``second``."""
     a, b = np.asarray(second, dtype=float), np.asarray(first, dtype=float)
-    return np.append(
-        a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3]), a[3] * b[3] - a[:3] @ b[:3]
-    )
+    vector = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
+    return np.append(vector, a[3] * b[3] - a[:3] @ b[:3])
 
 
 def spike(height: float = 3.0) -> wc.TetMesh:
@@ -55,7 +55,6 @@ def ring(inner: tuple[float, float], outer: float, height: float, parts: int = 8
     angle = 2.0 * np.pi * x
     r = np.where(y > 0.5, outer, np.where(z > 0.5, inner[1], inner[0]))
     rolled = np.stack([r * np.cos(angle), r * np.sin(angle), height * (z - 1.0)], axis=1)
-    last = np.flatnonzero(x > 1.0 - 1e-9)  # the same vertices as the first four
     into = np.arange(len(x))
-    into[last] = np.arange(4)
+    into[x > 1.0 - 1e-9] = np.arange(4)  # the same vertices as the first four
     return wc.TetMesh(rolled[: len(x) - 4], into[grid.tets])

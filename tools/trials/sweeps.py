@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import warp_contact as wc
-from trials.case import DOWN, NONE, UP, soft
-from trials.watch import Setting
+from trials.setting import NONE, Setting, body, setting, soft
 
 COARSE, FINE = 5, 11  # cells along each side
 EDGE = 0.1  # of a block [m]
@@ -43,11 +42,11 @@ class Sweep:
 
 def step_stiffness(step: float, young: float) -> Setting:
     """Two blocks collide at 1 m/s with a fixed step."""
-    scene = wc.Scene(NONE, friction=0.3)
+    blocks = []
     for k, sign in enumerate((-1.0, 1.0)):
         place = 0.004 * k, 0.003 * k, sign * (0.5 * EDGE + 0.002)
-        scene.add_body(wc.box(EDGE, 2 + k), soft(young), place, velocity=(0.0, 0.0, -0.5 * sign))
-    return fixed_steps(scene, 0.06, step)
+        blocks.append(body(wc.box(EDGE, 2 + k), soft(young), place, v=-0.5 * sign))
+    return fixed_steps(*blocks, seconds=0.06, step=step)
 
 
 def mass_stiffness(mass: float, young: float) -> Setting:
@@ -56,14 +55,10 @@ def mass_stiffness(mass: float, young: float) -> Setting:
     At the largest mass ratio the pressure at rest is as large as the lower block's modulus. The
     weight of the upper block over its section is mass / (1e4 young) of its own moduli.
     """
-    scene = wc.Scene(DOWN, friction=0.3)
     base = 1e4 * 1000.0 * 9.81 * EDGE
-    low = wc.box(EDGE, 2)
-    held = low.vertices[:, 2] < -0.049
-    scene.add_body(low, soft(base), fixed=held)
-    high = soft(base * young, 1000.0 * mass)
-    scene.add_body(wc.box(EDGE, 3), high, (0.004, 0.003, EDGE + 2e-3))
-    return Setting(scene, 0.1, FRAMES / 0.1, pairs=((0, 1, UP),))
+    low = body(wc.box(EDGE, 2), soft(base), fixed="base")
+    high = body(wc.box(EDGE, 3), soft(base * young, 1000.0 * mass), (0.004, 0.003, EDGE + 2e-3))
+    return setting(low, high, seconds=0.1, fps=FRAMES / 0.1)
 
 
 def overlap_thickness(overlap: float, thick: float) -> Setting:
@@ -71,29 +66,27 @@ def overlap_thickness(overlap: float, thick: float) -> Setting:
 
     Where the overlap is above the thickness it sticks out of the far face.
     """
-    scene = wc.Scene(NONE, friction=0.0)
-    young = 1e5
-    scene.add_body(wc.box((2.0 * EDGE, 2.0 * EDGE, thick * EDGE), (4, 4, 1)), soft(young))
-    place = 0.004, 0.003, (0.5 * thick + 0.5 - overlap) * EDGE
-    scene.add_body(wc.box(EDGE, 3), soft(young), place)
-    return Setting(scene, 0.3, FRAMES / 0.3, pairs=((0, 1, UP),), recovers=True)
+    plate = body(wc.box((2.0 * EDGE, 2.0 * EDGE, thick * EDGE), (4, 4, 1)))
+    block = body(wc.box(EDGE, 3), at=(0.004, 0.003, (0.5 * thick + 0.5 - overlap) * EDGE))
+    run = {"seconds": 0.3, "fps": FRAMES / 0.3, "recovers": True}
+    return setting(plate, block, gravity=NONE, friction=0.0, **run)
 
 
 def speed_step(speed: float, step: float) -> Setting:
     """A block hits a thin plate that is held, with a fixed step."""
-    scene = wc.Scene(NONE, friction=0.3)
     thick, length = 0.004, 0.04
-    scene.add_body(wc.box((EDGE, EDGE, thick), (3, 3, 1)), soft(1e4), fixed=True)
+    plate = body(wc.box((EDGE, EDGE, thick), (3, 3, 1)), soft(1e4), fixed=True)
     place = 0.003, 0.002, 0.5 * (thick + length) + 0.6 * thick
-    scene.add_body(wc.box(length, 2), soft(1e4), place, velocity=(0.0, 0.0, -speed))
-    way = max(3.0 * length / speed, 10.0 * step)
-    return fixed_steps(scene, min(way, 600.0 * step), step)
+    block = body(wc.box(length, 2), soft(1e4), place, v=-speed)
+    seconds = min(max(3.0 * length / speed, 10.0 * step), 600.0 * step)
+    return fixed_steps(plate, block, seconds=seconds, step=step)
 
 
-def fixed_steps(scene: wc.Scene, seconds: float, step: float) -> Setting:
-    """About ``FRAMES`` frames of equal steps of ``step`` [s]."""
+def fixed_steps(*bodies: dict, seconds: float, step: float) -> Setting:
+    """About ``FRAMES`` frames of equal steps of ``step`` [s], without gravity."""
     substeps = max(1, round(seconds / FRAMES / step))
-    return Setting(scene, seconds, 1.0 / (step * substeps), substeps, pairs=((0, 1, UP),))
+    run = {"seconds": seconds, "fps": 1.0 / (step * substeps), "substeps": substeps}
+    return setting(*bodies, gravity=NONE, **run)
 
 
 SWEEPS = {

@@ -1,0 +1,99 @@
+"""A setting: bodies in a scene, for how long, and what is watched; a case: what ought to become."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+import warp_contact as wc
+from trials.outcome import FINE
+
+G = 9.81  # [m/s^2]
+DOWN, NONE, UP = (0.0, 0.0, -G), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+BASE = 0.01  # of its height: vertices that are no further from its lowest ones are a body's base
+
+
+@dataclass
+class Setting:
+    """A scene, how long to run it and what to look at.
+
+    Attributes:
+        scene: as it starts
+        seconds: how long [s]
+        fps: frames per second
+        substeps: of a frame; None leaves it to the solver
+        pairs: indices of two bodies and the unit vector from the first to the second, upwards if
+            left out; None watches each body and the next
+        recovers: it starts with an overlap; only that at the end counts, and no body may pop
+        held: lower bound of the elastic energy with that overlap closed before anything moves [J]
+        drive: called before each frame; the energy is then not judged
+    """
+
+    scene: wc.Scene
+    seconds: float
+    fps: float = 200.0
+    substeps: int | None = None
+    pairs: tuple | None = None
+    recovers: bool = False
+    held: float = 0.0
+    drive: Callable | None = None
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case.
+
+    Attributes:
+        name: number in the specification and a few words
+        build: its setting; raises ValueError where the input is refused
+        expect: ``fine``, ``refused``, or ``beyond`` for what is refused though it has a meaning
+        limit: seconds that it may take
+    """
+
+    name: str
+    build: Callable[[], Setting]
+    expect: str = FINE
+    limit: float = 120.0
+
+
+def case(name: str, build: Callable, *args, expect=FINE, limit=120.0, **named) -> Case:
+    """The case whose setting is ``build(*args, **named)``."""
+    return Case(name, partial(build, *args, **named), expect, limit)
+
+
+def soft(young: float = 1e5, density: float = 1000.0, poisson: float = 0.4) -> wc.NeoHookean:
+    """A material without damping: nothing but the contact may take energy out."""
+    return wc.NeoHookean(young, poisson, density)
+
+
+def body(mesh: wc.TetMesh, material=None, at=NONE, turn=(0.0, 0.0, 0.0, 1.0), v=NONE, **more):
+    """The arguments of ``Scene.add_body``.
+
+    Args:
+        mesh: rest shape
+        material: ``soft()`` if None
+        at: where it is put [m]; a number is its height
+        turn: as a quaternion
+        v: velocity [m/s]; a number is that upwards
+        more: ``fixed``, "base" for its lowest vertices, and ``label``
+    """
+    if isinstance(more.get("fixed"), str):
+        z = mesh.vertices[:, 2]
+        more["fixed"] = z < z.min() + BASE * np.ptp(z)
+    at, v = ((0.0, 0.0, a) if np.isscalar(a) else a for a in (at, v))
+    return (
+        dict(mesh=mesh, material=material or soft(), position=at, rotation=turn, velocity=v) | more
+    )
+
+
+def setting(
+    *bodies: dict, seconds: float, gravity=DOWN, friction=0.3, planes=(), **watched
+) -> Setting:
+    """Bodies on the half-spaces above the ``planes`` through the origin; see ``Setting``."""
+    scene = wc.Scene(gravity, friction=friction)
+    for normal in planes:
+        scene.add_plane(normal)
+    for arguments in bodies:
+        scene.add_body(**arguments)
+    return Setting(scene, seconds, **watched)

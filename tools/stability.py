@@ -17,7 +17,7 @@ from measure.figure import MISSED
 from measure.report import Table
 from measure.run import one_of
 from trials import degenerate, figures, limits, loads, maps, shapes
-from trials.outcome import classify, level
+from trials.outcome import Record, classify, level
 from trials.sweeps import SWEEPS
 from trials.watch import METHODS, attempt
 
@@ -62,21 +62,16 @@ def main() -> int:
         for case in FAMILIES[family](args.quick):
             if args.only in case.name:
                 r = attempt(case.build, args.response, limit=case.limit)
-                found = level(r, case.expect)
-                missed += found == MISSED
-                numbers = (
-                    f"{r.overlap:.2%}",
-                    f"{r.gained:.2%}",
-                    f"{r.lowest:.3g}",
-                    f"{r.volume:.3g}",
-                )
-                counts = str(r.tunnelled), str(r.steps)
-                print(
-                    TABLE.line(case.name, classify(r), *numbers, *counts, found, r.reason),
-                    flush=True,
-                )
+                print(TABLE.line(case.name, *row(r), level(r, case.expect), r.reason), flush=True)
+                missed += level(r, case.expect) == MISSED
     print(f"{missed} missed" if missed else "all met")
     return 1 if missed else 0
+
+
+def row(r: Record) -> tuple[str, ...]:
+    """The figures of a run as text."""
+    numbers = f"{r.overlap:.2%}", f"{r.gained:.2%}", f"{r.lowest:.3g}", f"{r.volume:.3g}"
+    return classify(r), *numbers, str(r.tunnelled), str(r.steps)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""Where the paper's scenes lie in the maps, one mark for each pair of bodies that says something.
+"""What is drawn on a map: its frontier, and where the paper's scenes lie.
+
+These have a mark for each pair of bodies that says something:
 
     step    their step scaled by l / c to that of the map's blocks, l the shortest edge of the body
             with the largest c / l, c the square root of its Young's modulus over its density;
@@ -17,10 +19,13 @@ from typing import NamedTuple
 import numpy as np
 
 import warp_contact as wc
+from trials.outcome import FINE
 from trials.setting import G
+from trials.sweeps import Sweep
 from warp_contact import scenes
 
 FPS = 60
+CLOSE = 0.04  # of a map: marks that are nearer share one
 
 
 class Pair(NamedTuple):
@@ -42,13 +47,10 @@ class Pair(NamedTuple):
     overlap: float = 0.0
 
 
+BLOCKS = [Pair(f"{k}_upper", f"{k}_lower", overlap=0.01) for k in ("equal", "unequal")]
 FIGURES = {  # the paper's figure, arguments of build(), pairs
     "sampling": (1, {}, [Pair("coarse_on_fine_arch", "coarse_on_fine_slab", fall=0.01)]),
-    "two_bodies": (
-        6,
-        {},
-        [Pair(f"{k}_upper", f"{k}_lower", overlap=0.01) for k in ("equal", "unequal")],
-    ),
+    "two_bodies": (6, {}, BLOCKS),
     "cubes_on_membrane": (7, {}, [Pair(f"cube_{m}", "membrane", fall=0.005) for m in (1, 4, 16)]),
     "squeezed_sphere": (8, {}, [Pair("upper_cube", "sphere", speed=0.02)]),
     "bowl": (9, {"fraction": 0.1}, [Pair("melon_1", "lemon_1", fall=0.9)]),
@@ -110,3 +112,38 @@ def marks(sweep: str, cell: wc.Scene) -> list[tuple[int, float, float]]:
         places = {mark(sweep, *started(name), pair, cell) for pair in pairs}
         found += [(figure, *map(float, place)) for place in sorted(places)]
     return found
+
+
+def limit_line(s: Sweep, xs: np.ndarray, ys: np.ndarray) -> tuple[list[float], list[float]]:
+    """The line of the sweep's limit, as far as it lies on the map."""
+    places = [(float(i), place(y, ys)) for i, y in enumerate(s.limit[1](xs).tolist())]
+    on = [(i, j) for i, (j, off) in places if not off]
+    return [i for i, _ in on], [j for _, j in on]
+
+
+def labels(scenes: list[tuple], xs: np.ndarray, ys: np.ndarray) -> dict:
+    """Text and colour of the marks by their place; scenes in one place share a mark."""
+    found: dict[tuple, list] = {}
+    for figure, x, y in scenes:
+        (i, aside), (j, above) = place(x, xs), place(y, ys)
+        near = (at for at in found if np.hypot(at[0] - i, at[1] - j) < CLOSE * len(xs))
+        mark = found.setdefault(next(near, (i, j)), [])
+        mark.append((str(figure), "lightgrey" if aside or above else "white"))
+    return {at: (", ".join(dict.fromkeys(f for f, _ in m)), m[-1][1]) for at, m in found.items()}
+
+
+def place(value: float, values: np.ndarray) -> tuple[float, bool]:
+    """Where a value lies between the cells, and whether it is off the map, then on its rim."""
+    last = len(values) - 1
+    with np.errstate(divide="ignore"):
+        at = last * float(np.log(value / values[0]) / np.log(values[-1] / values[0]))
+    return float(np.clip(at, -0.5, last + 0.5)), not -0.5 <= at <= last + 0.5
+
+
+def frontier(grid: list[list[str]]) -> list[tuple[tuple, tuple]]:
+    """The sides between a cell that is fine and one that is not: (x, x), (y, y) of their ends."""
+    fine = np.array(grid) == FINE
+    right = np.argwhere(fine[:, 1:] != fine[:, :-1]).tolist()
+    above = np.argwhere(fine[1:] != fine[:-1]).tolist()
+    sides = [((i + 0.5, i + 0.5), (j - 0.5, j + 0.5)) for j, i in right]
+    return sides + [((i - 0.5, i + 0.5), (j + 0.5, j + 0.5)) for j, i in above]

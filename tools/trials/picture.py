@@ -1,16 +1,15 @@
-"""A heat map per sweep: outcomes, the frontier of what is fine, the paper's scenes (``marks.py``)."""
+"""A heat map per sweep: outcomes, the frontier of what is fine, the scenes of ``marks.py``."""
 
 from pathlib import Path
 
 import matplotlib
-import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.colors import ListedColormap
 
-from trials.marks import FIGURES, marks
-from trials.outcome import FINE, OUTCOMES
+from trials.marks import FIGURES, frontier, labels, limit_line, marks
+from trials.outcome import OUTCOMES
 from trials.sweeps import Sweep
 
 COLOURS = "#dcefdc", "#f6d55c", "#ed8b3b", "#c0392b", "#5b2c6f", "#8d99a6", "#1b1b1b", "#ffffff"
@@ -21,7 +20,6 @@ KEY = "\n".join(
         "grey on the rim: off the map",
     ]
 )
-CLOSE = 0.04  # of the map: marks that are nearer share one
 LINE = {"color": "black", "linewidth": 2.0}
 DOTS = {"color": "black", "linewidth": 1.5, "linestyle": ":"}
 
@@ -68,39 +66,3 @@ def legend(ax, s: Sweep) -> None:
         ax.plot([], [], label=s.limit[0], **DOTS)
     ax.legend(loc="upper center", fontsize=11, ncols=2)
     ax.text(0.02, 0.02, KEY, transform=ax.transAxes, fontsize=10, va="bottom")
-
-
-def limit_line(s: Sweep, xs: np.ndarray, ys: np.ndarray) -> tuple[list[float], list[float]]:
-    """The line of the sweep's limit, as far as it lies on the map."""
-    places = [(float(i), place(y, ys)) for i, y in enumerate(s.limit[1](xs).tolist())]
-    on = [(i, j) for i, (j, off) in places if not off]
-    return [i for i, _ in on], [j for _, j in on]
-
-
-def labels(scenes: list[tuple], xs: np.ndarray, ys: np.ndarray) -> dict:
-    """Text and colour of the marks by their place; scenes in one place share a mark."""
-    found: dict[tuple, list] = {}
-    for figure, x, y in scenes:
-        (i, aside), (j, above) = place(x, xs), place(y, ys)
-        near = (at for at in found if np.hypot(at[0] - i, at[1] - j) < CLOSE * len(xs))
-        mark = found.setdefault(next(near, (i, j)), [])
-        mark.append((str(figure), "lightgrey" if aside or above else "white"))
-    return {at: (", ".join(dict.fromkeys(f for f, _ in m)), m[-1][1]) for at, m in found.items()}
-
-
-def place(value: float, values: np.ndarray) -> tuple[float, bool]:
-    """Where a value lies between the cells, and whether it is off the map, then on its rim."""
-    last = len(values) - 1
-    with np.errstate(divide="ignore"):
-        at = last * float(np.log(value / values[0]) / np.log(values[-1] / values[0]))
-    return float(np.clip(at, -0.5, last + 0.5)), not -0.5 <= at <= last + 0.5
-
-
-def frontier(grid: list[list[str]]) -> list[tuple[tuple, tuple]]:
-    """The sides between a cell that is fine and one that is not: (x, x), (y, y) of their ends."""
-    fine = np.array(grid) == FINE
-    right, above = fine[:, 1:] != fine[:, :-1], fine[1:] != fine[:-1]
-    sides = [((i + 0.5, i + 0.5), (j - 0.5, j + 0.5)) for j, i in np.argwhere(right).tolist()]
-    return sides + [
-        ((i - 0.5, i + 0.5), (j + 0.5, j + 0.5)) for j, i in np.argwhere(above).tolist()
-    ]

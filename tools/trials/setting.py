@@ -82,9 +82,8 @@ def body(mesh: wc.TetMesh, material=None, at=NONE, turn=(0.0, 0.0, 0.0, 1.0), v=
         z = mesh.vertices[:, 2]
         more["fixed"] = z < z.min() + BASE * np.ptp(z)
     at, v = ((0.0, 0.0, a) if np.isscalar(a) else a for a in (at, v))
-    return (
-        dict(mesh=mesh, material=material or soft(), position=at, rotation=turn, velocity=v) | more
-    )
+    given = {"mesh": mesh, "material": material or soft(), "position": at, "rotation": turn}
+    return given | {"velocity": v} | more
 
 
 def setting(

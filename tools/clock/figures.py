@@ -1,5 +1,7 @@
-"""The figures of one case, by name."""
+"""The figures of one case, by name; what they are: ``tools/bench.py``."""
 
+import resource
+import sys
 from statistics import median
 from time import perf_counter
 from unittest import mock
@@ -8,11 +10,11 @@ import numpy as np
 import warp as wp
 
 import warp_contact as wc
-from clock.cases import Case
-from clock.memory import peak
+from clock.scenes import Case
 from clock.window import Timing, measure
 
 SHOWN_FRAMES = 3  # of which the median gives the frames per second
+BOUND = 90.0, 150.0, 1000.0  # ns that a tet, a surface vertex, a contact with its sweeps may take
 
 
 def figures(case: Case, frames: int | None, repeats: int, device: str | None) -> dict[str, float]:
@@ -24,54 +26,50 @@ def figures(case: Case, frames: int | None, repeats: int, device: str | None) ->
     timing = measure(sim, repeats)
     model = sim.model
     seconds, choice = frame_time(sim)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return {
         "vertices": model.n_vert,
         "surface_vertices": model.n_surf,
         "tets": model.n_tet,
         "bodies": model.n_body,
-        "contacts": timing.contacts,
         "substeps": sim.substeps,
         "window_steps": timing.steps,
         **step_figures(timing, model),
         "frames_per_second": 1.0 / seconds,
         "frame.choice_of_step_share": choice,
-        "array_bytes": timing.bytes,
         "array_bytes_per_vertex": timing.bytes / model.n_vert,
-        "peak_rss_bytes": peak(),
+        "peak_rss_bytes": peak if sys.platform == "darwin" else 1024 * peak,
     }
 
 
 def step_figures(timing: Timing, model) -> dict[str, float]:
-    """The whole step, then each stage."""
+    """The whole step, then each stage, then each operation."""
+    whole, step = timing.whole, timing.step_ms
+    sizes = {"tet": model.n_tet, "surface_vertex": model.n_surf, "contact": timing.contacts}
+    bound = sum(ns * n for ns, n in zip(BOUND, sizes.values(), strict=True))
     found = {
-        "step.launches": sum(timing.launches.values()),
-        "step.ms": timing.step_ms,
-        "step.ns_per_vertex": 1e6 * timing.step_ms / model.n_vert,
+        "contacts": timing.contacts,
+        "array_bytes": timing.bytes,
+        "step.launches": whole.launches,
+        "step.ms": step,
+        "step.ns_per_vertex": 1e6 * step / model.n_vert,
         "step.elastic_ms": timing.elastic_ms,
-        "step.operations_ms": sum(timing.ms.values()),
+        "step.operations_ms": whole.ms,
         "step.overhead_us_per_launch": timing.overhead_us,
-        "step.overhead_us": timing.overhead_us * sum(timing.launches.values()),
-        "step.of_bound": 1e6 * timing.step_ms / bound(model, timing.contacts),
-        "step.bytes": sum(timing.given.values()),
+        "step.overhead_us": timing.overhead_us * whole.launches,
+        "step.of_bound": 1e6 * step / bound,
+        "step.bytes": whole.bytes,
     }
-    for stage, ms in timing.ms.items():
-        found[f"{stage}.launches"] = timing.launches[stage]
-        found[f"{stage}.ms"] = ms
-        found[f"{stage}.bytes"] = timing.given[stage]
-        found[f"{stage}.share"] = timing.shares[stage]
-        found[f"{stage}.ns_per_tet"] = 1e6 * ms / model.n_tet
-        found[f"{stage}.ns_per_surface_vertex"] = 1e6 * ms / model.n_surf
-        if timing.contacts:
-            found[f"{stage}.ns_per_contact"] = 1e6 * ms / timing.contacts
-    for (stage, name), (launches, ms) in timing.kernels.items():
-        found[f"{stage}.{name}.launches"] = launches
-        found[f"{stage}.{name}.ms"] = ms
+    for stage, cost in timing.stages.items():
+        found |= {f"{stage}.{name}": value for name, value in cost._asdict().items()}
+        found[f"{stage}.share"] = cost.ms / (whole.ms or 1.0)  # a clock may be too coarse
+        for thing, n in sizes.items():
+            if n:
+                found[f"{stage}.ns_per_{thing}"] = 1e6 * cost.ms / n
+    for (stage, name), cost in timing.kernels.items():
+        found[f"{stage}.{name}.launches"] = cost.launches
+        found[f"{stage}.{name}.ms"] = cost.ms
     return found
-
-
-def bound(model, contacts: float) -> float:
-    """What a step may take [ns], by the size of the scene; the contacts with all their sweeps."""
-    return 90.0 * model.n_tet + 150.0 * model.n_surf + 1000.0 * contacts
 
 
 def frame_time(sim: wc.Simulation) -> tuple[float, float]:
@@ -85,12 +83,19 @@ def frame_time(sim: wc.Simulation) -> tuple[float, float]:
         return found
 
     with mock.patch.object(sim._stepper.spectrum, "rates", timed):
-        for _ in range(SHOWN_FRAMES):
-            start = perf_counter()
-            sim.step_frame()
-            wp.synchronize_device(sim.device)
-            times.append(perf_counter() - start)
+        times = frame_times(sim, SHOWN_FRAMES)
     return median(times), choice[0] / sum(times)
+
+
+def frame_times(sim: wc.Simulation, frames: int) -> list[float]:
+    """Wall time of each of the next frames [s]."""
+    times = []
+    for _ in range(frames):
+        start = perf_counter()
+        sim.step_frame()
+        wp.synchronize_device(sim.device)
+        times.append(perf_counter() - start)
+    return times
 
 
 def log_slope(x, y) -> float:

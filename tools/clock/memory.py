@@ -1,7 +1,5 @@
 """The Warp arrays behind a simulation: their bytes, and a copy to come back to."""
 
-import resource
-import sys
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 
@@ -25,22 +23,12 @@ def arrays(holder) -> Iterator[wp.array]:
 
 def held(*holders) -> int:
     """Bytes of all their arrays; what several of them share counts once."""
-    spans = sorted(
-        (a.ptr, a.ptr + a.size * wp.types.type_size_in_bytes(a.dtype))
-        for a in arrays(holders)
-        if a.size
-    )
     total, last = 0, 0
-    for first, end in spans:
-        total += max(0, end - max(first, last))
+    for a in sorted(arrays(holders), key=lambda a: a.ptr or 0):
+        end = (a.ptr or 0) + a.size * wp.types.type_size_in_bytes(a.dtype)
+        total += max(0, end - max(a.ptr or 0, last))
         last = max(last, end)
     return total
-
-
-def peak() -> int:
-    """Largest resident size of this process so far, in bytes."""
-    size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return size if sys.platform == "darwin" else 1024 * size
 
 
 class Snapshot:

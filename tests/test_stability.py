@@ -25,7 +25,7 @@ CASES = {
     "corner on a seam that gapes": partial(limits.seam, 1e-3),
     "ball on ball": partial(limits.balls, 147),
     "three fifths of a cube in another": partial(limits.deep, 0.6),
-    "cube on one large facet": partial(limits.facet, False),
+    "cube on one large facet": partial(limits.facet, 0.01),
     "20 plates a frame": partial(loads.through, 20.0, None),
     "ball of 67 m/s": partial(loads.golf, 41, 67.0),
     "tet in a slot": partial(shapes.slot, 5e-7),

@@ -7,6 +7,8 @@ inner edges of a floor. ``primitives`` are pairs of IPC's 16 unit tests, stacks 
 
 from collections.abc import Iterator
 
+import numpy as np
+
 import warp_contact as wc
 from trials.pieces import AS_IS, UPSIDE_DOWN, about, both, ridge, ring, spike, tip, wedge
 from trials.setting import NONE, UP, Case, Setting, body, case, setting, soft
@@ -27,18 +29,26 @@ PAIRS = {  # lower and upper body, each turned
 def spikes(quick: bool) -> Iterator[Case]:
     """All ten, with single and with many tets where a floor is in play."""
     turned = both(about("z", 90.0), UPSIDE_DOWN)
-    yield case("B1.1 spike on spike", onto, spike, spike, UPSIDE_DOWN)
-    yield case("B1.2 spike on wedge", onto, wedge, spike, UPSIDE_DOWN)
+    yield case("B1.1 spike on spike", onto, spike, spike)
+    yield case("B1.2 spike on wedge", onto, wedge, spike)
     yield case("B1.3 wedge on wedge, crossed", onto, wedge, wedge, turned)
-    yield case("B1.3 wedge on wedge, parallel", onto, wedge, wedge, UPSIDE_DOWN)
+    yield case("B1.3 wedge on wedge, parallel", onto, wedge, wedge)
     yield case("B1.4 spike in a hole, pulled through", hole)
     yield case("B1.5 spike in a crack", crack, spike)
     yield case("B1.6 wedge in a crack", crack, wedge)
-    yield case("B1.7 spike slides at 10 m/s", slide, spike)
-    yield case("B1.8 wedge slides at 10 m/s", slide, wedge)
-    yield case("B1.9 cube on the edge of a cliff", cliff)
+    for name, shape in (("B1.7 spike", spike), ("B1.8 wedge", wedge)):
+        floor = body(wc.box((16.0, 4.0, 1.0), (12, 3, 1)), soft(1e6), (5.0, 0.0, -0.5), fixed=True)
+        slider = body(shape(), at=3.0 + DROP, v=(10.0, 0.0, 0.0))
+        yield case(f"{name} slides at 10 m/s", setting, floor, slider, friction=0.1, seconds=1.0)
+    cliff = body(wc.box(4.0, 1), soft(1e6), (-2.0, 0.0, -2.0), fixed=True)
+    cube = body(wc.box(1.0, 1), at=(-0.1, 0.0, 0.6), turn=about("z", 20.0))
+    yield case("B1.9 cube on the edge of a cliff", setting, cliff, cube, friction=1.0, seconds=1.5)
     for cells in (1, 4) if quick else (1, 4, 9):
-        yield case(f"B1.10 cube slides over {cells} inner edges", inner_edges, cells)
+        mesh = wc.box((8.0, 4.0, 1.0), (2 * cells, cells, 1))
+        floor = body(mesh, soft(1e6), (2.0, 0.0, -0.5), fixed=True)
+        cube = body(wc.box(1.0, 1), at=(-1.0, 0.0, 0.5 + DROP), v=(2.0, 0.0, 0.0))
+        name = f"B1.10 cube slides over {cells} inner edges"
+        yield case(name, setting, floor, cube, friction=0.0, seconds=1.5)
 
 
 def primitives(quick: bool) -> Iterator[Case]:
@@ -47,28 +57,35 @@ def primitives(quick: bool) -> Iterator[Case]:
         yield case(f"B2 {name}", meet, *pair)
         yield case(f"B2 {name}, aside", meet, *pair, aside=(0.07, 0.04))
     for cells in (1, 2):
-        yield case(f"B2 cube on plane, {cells} cells", on_plane, cells)
+        cube = body(wc.box(1.0, cells), at=0.5 + GAP)
+        yield case(f"B2 cube on plane, {cells} cells", setting, cube, planes=[UP], seconds=2.0)
         for where, aside in (("aligned", (0.0, 0.0)), ("shifted", (0.3, 0.4))):
             yield case(f"B2 cube on cube, {where}, {cells} cells", stack, 2, 0.02, cells, aside)
     yield case("B2 stack of five cubes, gap 1", stack, 5, 1.0, 1)
-    yield case("B2 cube in a corner, clearance 0.005", corner)
+    cube = body(wc.box(1.0, 2), at=(0.505, 0.505, 0.505))
+    leaning = {"gravity": (-3.0, -4.0, -8.0), "planes": np.eye(3), "seconds": 1.5}
+    yield case("B2 cube in a corner, clearance 0.005", setting, cube, **leaning)
     for clearance in (5e-3, 5e-7):
         yield case(f"B2 tet in a slot, clearance {clearance:g}", slot, clearance)
     if not quick:
-        yield case("B2 pyramid of five cubes", pyramid)
+        middle = np.cumsum(FIRST_EDGES) - 0.5 * np.array(FIRST_EDGES) + 0.01 * np.arange(5)
+        sizes = zip(FIRST_EDGES, middle.tolist(), strict=True)
+        cubes = [body(wc.box(edge, 2), soft(1e6), z) for edge, z in sizes]
+        run = {"friction": 0.5, "planes": [UP], "seconds": 2.0}
+        yield case("B2 pyramid of five cubes", setting, *cubes, **run)
 
 
-def onto(low, high, turn) -> Setting:
+def onto(low, high, turn=UPSIDE_DOWN) -> Setting:
     """The upper body stands on its tip or edge on that of the lower one, which is fixed."""
-    lower, upper = body(low(), fixed=True, label="low"), body(high(), at=DROP, turn=turn)
-    return setting(lower, upper | {"label": "high"}, friction=1.0, seconds=1.25)
+    lower, upper = body(low(), fixed=True), body(high(), at=DROP, turn=turn)
+    return setting(lower, upper, friction=1.0, seconds=1.25)
 
 
 def hole() -> Setting:
     """The base of a spike is pulled down at 1 m/s through a funnel half as wide as the base."""
-    funnel = body(ring((0.3, 0.8), 2.0, 1.0, 12), soft(1e6), fixed=True, label="hole")
+    funnel = body(ring((0.3, 0.8), 2.0, 1.0, 12), soft(1e6), fixed=True)
     turn, pulled = both(about("z", 15.0), UPSIDE_DOWN), [4]
-    needle = body(spike(), at=-0.6, turn=turn, fixed=pulled, label="spike")
+    needle = body(spike(), at=-0.6, turn=turn, fixed=pulled)
 
     def drive(sim: wc.Simulation) -> None:
         sim.set_velocity(1, (0.0, 0.0, -1.0), pulled)
@@ -83,46 +100,18 @@ def crack(shape) -> Setting:
     for side in (-1.0, 1.0):
         lean = wc.TetMesh(x + (side * 0.15 * (x[:, 2:] + 1.5)) * [1.0, 0.0, 0.0], block.tets)
         walls.append(body(lean, soft(1e6), (side * 1.05, 0.0, -1.5), fixed=True))
-    falling = body(shape(), at=(0.02, 0.01, -0.2), turn=UPSIDE_DOWN, label="wedge")
+    falling = body(shape(), at=(0.02, 0.01, -0.2), turn=UPSIDE_DOWN)
     return setting(*walls, falling, seconds=2.0, pairs=((0, 2, (1, 0, 0)), (2, 1, (1, 0, 0))))
-
-
-def slide(shape) -> Setting:
-    """A body on its base slides over a floor of many facets."""
-    floor = wc.box((16.0, 4.0, 1.0), (12, 3, 1))
-    lower = body(floor, soft(1e6), (5.0, 0.0, -0.5), fixed=True, label="floor")
-    upper = body(shape(), at=3.0 + DROP, v=(10.0, 0.0, 0.0), label="slider")
-    return setting(lower, upper, friction=0.1, seconds=1.0)
-
-
-def cliff() -> Setting:
-    """A cube falls with a part of its base on the edge of a block."""
-    lower = body(wc.box(4.0, 1), soft(1e6), (-2.0, 0.0, -2.0), fixed=True, label="cliff")
-    upper = body(wc.box(1.0, 1), at=(-0.1, 0.0, 0.6), turn=about("z", 20.0), label="cube")
-    return setting(lower, upper, friction=1.0, seconds=1.5)
-
-
-def inner_edges(cells: int) -> Setting:
-    """A cube slides without friction over a floor that is plane but not one facet."""
-    floor = wc.box((8.0, 4.0, 1.0), (2 * cells, cells, 1))
-    lower = body(floor, soft(1e6), (2.0, 0.0, -0.5), fixed=True, label="floor")
-    upper = body(wc.box(1.0, 1), at=(-1.0, 0.0, 0.5 + DROP), v=(2.0, 0.0, 0.0))
-    return setting(lower, upper, friction=0.0, seconds=1.5)
 
 
 def meet(low, low_turn, high, high_turn, aside=(0.0, 0.0)) -> Setting:
     """A body hits a fixed one, without gravity; ``aside`` keeps them off the symmetric place."""
-    lower = body(low(), turn=low_turn, fixed=True, label="low")
-    upper = body(high(), turn=high_turn, v=-SPEED, label="high")
+    lower = body(low(), turn=low_turn, fixed=True)
+    upper = body(high(), turn=high_turn, v=-SPEED)
     s = setting(lower, upper, gravity=NONE, seconds=0.6)
     a, b = s.scene.bodies
     b.x[:] += [*aside, a.x[:, 2].max() + GAP - b.x[:, 2].min()]
     return s
-
-
-def on_plane(cells: int) -> Setting:
-    """A cube falls on the ground."""
-    return setting(body(wc.box(1.0, cells), at=0.5 + GAP), planes=[UP], seconds=2.0)
 
 
 def stack(count: int, gap: float, cells: int, aside=(0.0, 0.0)) -> Setting:
@@ -135,27 +124,9 @@ def stack(count: int, gap: float, cells: int, aside=(0.0, 0.0)) -> Setting:
     return setting(*cubes, friction=0.5, planes=[UP], seconds=seconds)
 
 
-def pyramid() -> Setting:
-    """Ever smaller cubes on each other."""
-    top, cubes = 0.0, []
-    for edge in FIRST_EDGES:
-        cubes.append(body(wc.box(edge, 2), soft(1e6), top + 0.5 * edge))
-        top += edge + 0.01
-    return setting(*cubes, friction=0.5, planes=[UP], seconds=2.0)
-
-
-def corner() -> Setting:
-    """A cube falls into a corner of three planes that leans."""
-    cube = body(wc.box(1.0, 2), at=(0.505, 0.505, 0.505))
-    planes = (1, 0, 0), (0, 1, 0), (0, 0, 1)
-    return setting(cube, gravity=(-3.0, -4.0, -8.0), planes=planes, seconds=1.5)
-
-
 def slot(clearance: float) -> Setting:
     """A tet between two fixed walls."""
-    walls = []
-    for side in (-1.0, 1.0):
-        place = side * (0.5 + clearance + 0.5), 0.0, 0.0
-        walls.append(body(wc.box((1.0, 3.0, 4.0), 1), at=place, fixed=True, label=f"wall{side:+g}"))
-    tet, across = body(ridge(), at=1.0, label="tet"), (1, 0, 0)
-    return setting(*walls, tet, friction=0.0, seconds=0.4, pairs=((0, 2, across), (2, 1, across)))
+    places = [(side * (0.5 + clearance + 0.5), 0.0, 0.0) for side in (-1.0, 1.0)]
+    walls = [body(wc.box((1.0, 3.0, 4.0), 1), at=place, fixed=True) for place in places]
+    pairs = (0, 2, (1, 0, 0)), (2, 1, (1, 0, 0))
+    return setting(*walls, body(ridge(), at=1.0), friction=0.0, seconds=0.4, pairs=pairs)

@@ -120,10 +120,10 @@ class Watch:
         r.finite = bool(np.isfinite(sim.positions()).all() and np.isfinite(sim.velocities()).all())
         if not r.finite:
             return r
-        r.volume = min(volume_ratio(b.mesh, sim.positions(b)) for b in sim.scene.bodies)
-        r.lowest = min(r.lowest, r.volume)
         r.lost = r.lost or self._wrong_side()
         now = sim.measure()
+        r.volume = now.volume_ratio
+        r.lowest = min(r.lowest, r.volume)
         r.touched = r.touched or now.n_contacts > 0 or bool(now.forces)
         deepest = now.overlap / self.size
         if setting.recovers:
@@ -193,10 +193,3 @@ def alarm(seconds: float):
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-
-
-def volume_ratio(mesh: wc.TetMesh, x: np.ndarray) -> float:
-    """Smallest volume of a tet over that at rest."""
-    a, b, c, d = np.moveaxis(x.astype(float)[mesh.tets], 1, 0)
-    volume = np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6.0
-    return float((volume / mesh.volumes).min())

@@ -157,7 +157,7 @@ def draw(folder: Path, titles: dict[str, str], found: Iterable[Point]) -> None:
         return
     picture.draw(folder / "pareto.png", titles, found)
     if {p.panel for p in found}.issuperset(picture.SUMMARY):
-        picture.draw_summary(folder / "summary.png", found)
+        picture.draw(folder / "summary.png", picture.SUMMARY, found)
 
 
 def head(python: str, repeats: int, seconds: float) -> str:

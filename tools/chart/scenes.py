@@ -43,9 +43,9 @@ def scene(name: str, quick: bool) -> tuple[Task, list[Panel]]:
     module = scenes.load(name)
     frames = round((QUICK if quick else DURATION) * FPS)
     errors = {
-        "": ("overlap, or gap where bodies press on each other", apart),
-        " overlap": ("overlap alone, which a margin hides", inside),
-        " motion": ("distance from a converged run, rms of all vertices and frames", astray),
+        "": ("overlap or gap", apart),
+        " overlap": ("overlap alone", inside),
+        " motion": ("distance from a converged run", astray),
     }
     panels = [
         Panel(name + end, f"{TITLES[name]}\n{title} [of an edge]", partial(error, PRESSED[name]))

@@ -15,10 +15,10 @@ import numpy as np
 
 from engines.task import Failed, Motion, Numbered, Task
 
-ADAPTERS = {  # of each engine: its file and its law of elasticity
-    "Newton VBD": ("newton_vbd.py", "neo-hookean"),
-    "Newton XPBD": ("newton_xpbd.py", "neo-hookean"),
-    "MuJoCo flex": ("mujoco_flex.py", "st-venant"),
+ADAPTERS = {  # of each engine: its file, a word for it, and its law of elasticity
+    "Newton VBD": ("newton_solvers.py", "vbd", "neo-hookean"),
+    "Newton XPBD": ("newton_solvers.py", "xpbd", "neo-hookean"),
+    "MuJoCo flex": ("mujoco_flex.py", "", "st-venant"),
 }
 GRACE = 300.0  # seconds for imports and kernels, on top of the limits of the runs
 PACKAGES = "newton", "mujoco", "warp-lang"
@@ -36,11 +36,11 @@ def run(
         python: interpreter that has the engine
         limit: wall seconds after which one run is given up
     """
-    adapter, law = ADAPTERS[engine]
+    adapter, word, law = ADAPTERS[engine]
     with tempfile.TemporaryDirectory() as folder:
         job = Path(folder)
         write(job, task, settings, limit)
-        command = [python, str(Path(__file__).with_name(adapter)), folder]
+        command = [python, str(Path(__file__).with_name(adapter)), folder, word]
         timeout = GRACE + limit * len(settings)
         try:
             done = subprocess.run(

@@ -1,15 +1,33 @@
-"""Scenes for the solvers of Newton, and the frame loop, replayed as a captured graph.
+"""Newton's solvers: vertex block descent, and extended position-based dynamics.
 
-Newton's small-strain Lame parameters and its stable neo-Hookean energy are those of this package.
-Both solvers damp tets by one coefficient, each in its own way: see the adapters.
+Knobs of both: ``steps`` in a frame and ``iterations``. Its small-strain Lame parameters and its
+stable neo-Hookean energy are those of this package.
+
+``vbd``: implicit Euler, contact at a margin, a penalty inside it. Knobs: ``contact`` stiffness over
+E edge, and the ``margin`` over an edge at which contact begins. Its contact knows triangles and
+edges, and takes all bodies as one mesh. It is looked for within two margins; between two looks no
+vertex moves further than 0.85 margins. Its damping sees the rate of F^T F: for a stress 2 beta mu
+of the strain rate it takes beta mu / 2, and it has no part for the volume.
+
+``xpbd``: constraints of tets, relaxed all at once. Knobs: ``relaxation`` and ``radius``. Between
+soft bodies its contact knows particles only: balls about the vertices, of a radius over a mean edge
+of the finest body. Two of one body that are closer than two radii push each other apart at rest,
+too: in cells of ``box`` from 0.44 on, in sheets one layer thick always. Its damping of a constraint
+is the coefficient over the modulus: that of the shape is beta as in the scene, that of the volume
+beta mu / lambda. Its constraints tr(F^T F) - 3 and det F - 1 both see no more than the change of
+volume at small strains; forces are read as those of the law that the scene asks for.
 """
+
+import sys
 
 import newton
 import numpy as np
 import warp as wp
-from job import mean_edge
+from job import CannotDo, main, mean_edge
 
 wp.config.log_level = wp.LOG_WARNING
+
+POINT = 1e-3  # radius of a particle over a mean edge, where the radius is no knob
 
 
 @wp.kernel
@@ -19,14 +37,45 @@ def drive(v: wp.array[wp.vec3], dt: float, q: wp.array[wp.vec3]):
     q[i] = q[i] + dt * v[i]
 
 
-def build(scene, friction: float, damping: float, stiffness: float, radius: float) -> newton.Model:
+def vbd(scene, job: dict, setting: dict) -> "Engine":
+    """The engine with vertex block descent."""
+    edge = mean_edge(scene)
+    margin = setting["margin"] * edge
+    model = build(scene, job["friction"], 0.5, setting["contact"], POINT * edge)
+    solver = newton.solvers.SolverVBD(
+        model,
+        iterations=setting["iterations"],
+        particle_enable_self_contact=len(scene.young) > 1,
+        particle_self_contact_margin=margin,
+        particle_self_contact_gap=margin,
+        particle_enable_tile_solve=False,
+    )
+    return Engine(scene, job, setting, model, solver)
+
+
+def xpbd(scene, job: dict, setting: dict) -> "Engine":
+    """The engine with extended position-based dynamics."""
+    if scene.lame[:, 1].min() <= 0.0:
+        raise CannotDo("its tets have no forces where the second Lame parameter is zero")
+    radius = (POINT if len(scene.young) == 1 else setting["radius"]) * mean_edge(scene)
+    model = build(scene, job["friction"], 1.0, 1.0, radius)
+    solver = newton.solvers.SolverXPBD(
+        model,
+        iterations=setting["iterations"],
+        soft_body_relaxation=setting["relaxation"],
+        soft_contact_relaxation=setting["relaxation"],
+    )
+    return Engine(scene, job, setting, model, solver)
+
+
+def build(scene, friction: float, damping: float, contact: float, radius: float) -> newton.Model:
     """A coloured model with the masses of the scene; a mass of zero holds a particle.
 
     Args:
         scene: arrays of a job
         friction: of planes and particles [-]; the solvers mix both
         damping: coefficient of a tet, over beta mu [-]
-        stiffness: of contact [N/m]
+        contact: stiffness over the smallest modulus and an edge of the finest body [-]
         radius: of the particles [m]
     """
     builder = newton.ModelBuilder(gravity=tuple(scene.gravity.tolist()))
@@ -48,6 +97,7 @@ def build(scene, friction: float, damping: float, stiffness: float, radius: floa
             particle_radius=radius,
         )
     builder.particle_mass = np.where(scene.fixed, 0.0, scene.mass).tolist()
+    stiffness = contact * float(scene.young.min()) * mean_edge(scene)
     config = newton.ModelBuilder.ShapeConfig(ke=stiffness, kd=0.0, mu=friction)
     for *n, h in scene.planes.tolist():
         builder.add_shape_plane(plane=(*n, -h), width=0.0, length=0.0, cfg=config)
@@ -59,7 +109,7 @@ def build(scene, friction: float, damping: float, stiffness: float, radius: floa
 
 
 class Engine:
-    """Steps a model with a solver."""
+    """Steps a model with a solver, frame by frame as a captured graph."""
 
     def __init__(self, scene, job: dict, setting: dict, model: newton.Model, solver):
         """Lay out the states; ``solver`` steps from the one to the other."""
@@ -109,6 +159,5 @@ class Engine:
             wp.copy(self.now.particle_qd, a.particle_qd)
 
 
-def stiffness(scene, times: float) -> float:
-    """Of contact [N/m]: ``times`` the smallest modulus and an edge of the finest body."""
-    return times * float(scene.young.min()) * mean_edge(scene)
+if __name__ == "__main__":
+    main({"vbd": vbd, "xpbd": xpbd}[sys.argv[2]])

@@ -113,7 +113,7 @@ def test_a_constant_of_a_kernel_is_another_one_and_then_the_same_again(name):
 
 def test_tilted_blocks_need_contacts_of_edges():
     line = ablation.compare(PARTS["edges"])
-    assert line.kept < 0.1  # the target of all collisions, tools/checks/collision.py
+    assert line.kept < 0.1  # the target of all collisions, tools/verification/collision.py
     # Without edges nothing keeps a corner out; it goes in by 5 % of an edge, and rounding in a
     # collision moves that by far less than the factor of 5 that is left here.
     assert line.off > 1.0

@@ -5,10 +5,10 @@ from functools import partial
 from unittest import mock
 
 import warp as wp
-from checks import surface as stage_4
 from stable import ratios, sweeps
 from stable.setup import attempt
 from verification import springs
+from verification import surface as stage_4
 from verification import weight as static
 from verification.setup import Ask, Pose
 
@@ -28,7 +28,7 @@ def overlapping() -> dict[str, float]:
     """Stage 4, overlap of 10 %, 1:10."""
     rows = stage_4.place("", "balanced", wc.Corotated, 0.0, (3, 4), 10.0)
     figure = "surface of the lower block [% of overlap]"
-    return {PLACE: abs(next(row.value for row in rows if row.figure == figure))}
+    return {PLACE: abs(next(row.value for row in rows if row.name == figure))}
 
 
 def deep() -> dict[str, float]:

@@ -10,8 +10,7 @@ from functools import cache
 
 import numpy as np
 from engines.task import Failed, Motion, Task
-from verification import collision, hertz
-from verification import ladder as mass_ladder
+from verification import collision, hertz, weight
 from verification.setup import G, on_face
 
 import warp_contact as wc
@@ -147,7 +146,7 @@ def free(quick: bool) -> Shown:
     del quick
 
     def build() -> wc.Scene:
-        return collision.build((3, 5), "head-on", DENSER)
+        return collision.thrown((3, 5), "head-on", DENSER)
 
     title = "A6 free collision 1:10\n{} [of that at the start]"
     panels = [
@@ -193,8 +192,7 @@ def met(task: Task, motion: Motion):
 # and their damping takes 1.25 s until less than 0.01 % of the weight is left of that error.
 
 RATIO = 100.0
-EDGE, LIGHT = mass_ladder.EDGE, mass_ladder.DENSITY  # [m], [kg/m^3]
-LADDER_CELLS = 2, 3
+EDGE, LIGHT = weight.EDGE, weight.DENSITY  # [m], [kg/m^3]
 LADDER_FPS, LADDER_TIME = 240, 1.5  # [1/s], [s]
 LADDER_ZETA = 0.1  # a small part of the rate at which the light cube alone would be damped
 
@@ -208,14 +206,14 @@ def ladder(quick: bool) -> Shown:
         omega = np.sqrt(young / (RATIO * LIGHT)) / EDGE
         scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=0.3)
         for k, density in enumerate((LIGHT, RATIO * LIGHT)):
-            mesh = wc.box(EDGE, LADDER_CELLS[k])
+            mesh = wc.box(EDGE, weight.CUBES[k])
             rubber = wc.NeoHookean(young, 0.0, density, 2.0 * LADDER_ZETA / omega)
             held = None if k else on_face(mesh, 2, -1)
-            scene.add_body(mesh, rubber, (0.0, 0.0, k * (EDGE + mass_ladder.GAP)), fixed=held)
+            scene.add_body(mesh, rubber, (0.0, 0.0, k * (EDGE + weight.APART)), fixed=held)
         return scene
 
     def start(scene: wc.Scene) -> np.ndarray:
-        return np.concatenate(mass_ladder.static(scene, young, RATIO))
+        return np.concatenate(weight.cubes(RATIO, young).static(scene))
 
     frames = round(LADDER_TIME * LADDER_FPS)
     task = Task(build, LADDER_FPS, frames, 0.1 * young * EDGE, start=start)
@@ -231,6 +229,6 @@ def carried(task: Task, motion: Motion) -> float:
     whole, solid = sound(task, motion)
     light, heavy = whole.parts
     base = task.scene().bodies[0].fixed
-    own, weight = whole.mass[light][~base].sum() * G, whole.mass[heavy].sum() * G
+    own, load = whole.mass[light][~base].sum() * G, whole.mass[heavy].sum() * G
     forces = [-solid.forces(x)[light][base, 2].sum() - own for x in motion.x[late(task)]]
-    return float(np.sqrt(np.mean(np.square(np.array(forces) / weight - 1.0))))
+    return float(np.sqrt(np.mean(np.square(np.array(forces) / load - 1.0))))

@@ -14,10 +14,10 @@ from functools import cache, partial
 
 import numpy as np
 import warp as wp
-from checks.scenes import in_edges
 from engines import ours
 from engines.settings import DEFAULT
 from engines.task import Failed, Motion, Numbered, Task
+from verification.scenes import in_edges
 
 import warp_contact as wc
 from chart.distance import distance

@@ -60,9 +60,7 @@ class Figure:
             high = math.inf if self.most is None else self.most
             return OK if self.value is not None and low <= self.value <= high else MISSED
         held = sum(self.error is not None and abs(self.error) <= most for most in self.limits)
-        if not held:
-            return MISSED
-        return OK if len(self.limits) == 1 else LEVELS[held - 1]
+        return (MISSED, *(LEVELS if len(self.limits) > 1 else (OK,)))[held]
 
 
 def relative(case: str, name: str, value: float, exact: float, limits=()) -> Figure:
@@ -73,11 +71,6 @@ def relative(case: str, name: str, value: float, exact: float, limits=()) -> Fig
 def zero(case: str, name: str, value: float, limits=()) -> Figure:
     """A figure that ought to vanish."""
     return Figure(case, name, float(value), 0.0, float(value), limits)
-
-
-def stopped(case: str, error: Exception) -> Figure:
-    """A run that ended early: it misses, whatever was wanted."""
-    return Figure(case, "stopped early", None, most=0.0, note=str(error))
 
 
 def lowest(figures: Iterable[Figure]) -> str:

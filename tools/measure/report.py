@@ -6,7 +6,7 @@ digits, below a line with the machine; JSON has the machine and the values by ``
 
 import csv
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -62,9 +62,3 @@ def write(path: str | Path, figures: Sequence[Figure], device: str | None = None
         out = csv.writer(file)
         out.writerow([*names, "level"])
         out.writerows([*(getattr(f, name) for name in names), f.level] for f in figures)
-
-
-def read(path: str | Path) -> Iterator[dict[str, str]]:
-    """The rows of a table of CSV that ``write`` wrote, as text by column."""
-    with open(path, newline="", encoding="utf-8") as file:
-        yield from csv.DictReader(text for text in file if not text.startswith("#"))

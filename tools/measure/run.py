@@ -4,29 +4,23 @@ import argparse
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
 from measure import report
-from measure.figure import MISSED, Figure, lowest, stopped
+from measure.figure import MISSED, Figure, lowest
 from warp_contact import SimulationError
 
 Case = Callable[[], Iterable[Figure]]
 
 
-def run(
-    cases: Mapping[str, Case], line: Callable[[Figure], str] = report.line
-) -> dict[str, list[Figure]]:
-    """The figures of every case, each printed as it comes.
+def run(cases: Mapping[str, Case]) -> dict[str, list[Figure]]:
+    """The figures of every case by its name, each printed as it comes.
 
     A case that ends with a ``SimulationError`` keeps the figures that it has and misses.
-
-    Args:
-        cases: what to call for the figures of each, by name
-        line: how a figure is printed
     """
     found = {}
     for name, case in cases.items():
         found[name] = kept = []
         for figure in guarded(name, case):
             kept.append(figure)
-            print(line(figure), flush=True)
+            print(report.line(figure), flush=True)
     return found
 
 
@@ -35,7 +29,7 @@ def guarded(name: str, case: Case) -> Iterator[Figure]:
     try:
         yield from case()
     except SimulationError as error:
-        yield stopped(name, error)
+        yield Figure(name, "stopped early", None, most=0.0, note=str(error))
 
 
 def status(found: Mapping[str, Iterable[Figure]]) -> int:

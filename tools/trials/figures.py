@@ -1,6 +1,6 @@
 """The scenes of the paper as they are, the sphere squeezed further; blocks that no one chose.
 
-``tilts`` are the collisions of ``checks/collision.py`` with rotation, place, cells and stiffness
+``tilts`` are the collisions of ``verification/collision.py`` with rotation, place, cells and stiffness
 drawn anew for each number. Corners slide over facets that they bend, and pass each other tip on
 tip.
 """
@@ -8,7 +8,7 @@ tip.
 from collections.abc import Iterator
 
 import numpy as np
-from checks import collision
+from verification import collision
 
 import warp_contact as wc
 from trials.setting import Case, Setting, case

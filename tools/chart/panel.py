@@ -14,17 +14,11 @@ LAST = 0.1  # part of the frames at the end over which a state of rest is averag
 
 
 class Panel(NamedTuple):
-    """An error of the runs of a task.
+    """An error of the runs of a task."""
 
-    Attributes:
-        name: short, as in the table
-        title: what the error is
-        error: of a motion; raises ``Failed``
-    """
-
-    name: str
-    title: str
-    error: Callable[[Task, Motion], float]
+    name: str  # short, as in the table
+    title: str  # of the panel, and on a second line what the error is
+    error: Callable[[Task, Motion], float]  # of a motion; raises ``Failed``
 
 
 def sound(task: Task, motion: Motion) -> tuple[Numbered, Elastic]:

@@ -1,7 +1,7 @@
 """The points of the chart: their table, and who of them is ahead."""
 
 import csv
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 OK = "ok"
@@ -11,27 +11,16 @@ HEAD += "start-up s", "shown"
 
 @dataclass(frozen=True)
 class Point:
-    """A method at one setting in one panel: an error and what it cost, or why there is none.
-
-    Attributes:
-        panel: name of the panel
-        method: name of the method
-        setting: its knobs, as text
-        wall: seconds per simulated second; None where nothing could be timed
-        error: None where the run has none
-        outcome: ``ok``, or the reason why there is no error
-        startup: seconds up to the end of the first frame: build, compile or load
-        shown: whether the pictures have it; of penalties only the best stiffness is
-    """
+    """A method at one setting in one panel: an error and what it cost, or why there is none."""
 
     panel: str
     method: str
-    setting: str
-    wall: float | None
-    error: float | None
-    outcome: str = OK
-    startup: float | None = None
-    shown: bool = True
+    setting: str  # its knobs, as text
+    wall: float | None  # seconds per simulated second; None where nothing could be timed
+    error: float | None  # None where the run has none
+    outcome: str = OK  # or the reason why there is no error
+    startup: float | None = None  # seconds up to the end of the first frame: build, compile or load
+    shown: bool = True  # in the pictures; of penalties only the best stiffness is
 
     @property
     def failed(self) -> bool:
@@ -40,10 +29,8 @@ class Point:
 
     def cells(self) -> list[str]:
         """A row of the table, with all digits."""
-        numbers = ("" if n is None else str(n) for n in (self.wall, self.error, self.startup))
-        wall, error, startup = numbers
-        row = [self.panel, self.method, self.setting, wall, error, self.outcome, startup]
-        return [*row, "yes" if self.shown else "no"]
+        *cells, shown = astuple(self)
+        return [*("" if c is None else str(c) for c in cells), "yes" if shown else "no"]
 
 
 def write(path: Path, points: list[Point]) -> None:

@@ -46,19 +46,12 @@ SEED = 3
 
 @dataclass(frozen=True)
 class Case:
-    """One scene to time.
+    """One scene to time."""
 
-    Attributes:
-        build: the scene; those of the rows take the coefficient of friction
-        frames: to run before
-        series: those of the same name are compared by their number of vertices
-        pairs: that touch, None where they were not counted
-    """
-
-    build: Callable[..., wc.Scene]
-    frames: int
-    series: str = ""
-    pairs: int | None = None
+    build: Callable[..., wc.Scene]  # those of the rows take the coefficient of friction
+    frames: int  # to run before
+    series: str = ""  # those of the same name are compared by their number of vertices
+    pairs: int | None = None  # that touch, None where they were not counted
 
 
 def cases(quick: bool, large: bool, fraction: float) -> dict[str, Case]:

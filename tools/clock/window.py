@@ -34,23 +34,14 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True)
 class Timing:
-    """One step on average over a window; each time in it is the median of its repeats.
+    """One step on average over a window; each time in it is the median of its repeats."""
 
-    Attributes:
-        steps: in the window
-        step_ms: of the captured step, as simulations run it
-        elastic_ms: of a captured step without contact: predict, damping and drift
-        contacts: at the end of a step, mean over the window
-        bytes: in the arrays of model, state and work
-        kernels: cost of each operation, kernel or memory operation, by stage and name
-    """
-
-    steps: int
-    step_ms: float
-    elastic_ms: float
-    contacts: float
-    bytes: int
-    kernels: dict[tuple[str, str], Cost]
+    steps: int  # in the window
+    step_ms: float  # of the captured step, as simulations run it
+    elastic_ms: float  # of a captured step without contact: predict, damping and drift
+    contacts: float  # at the end of a step, mean over the window
+    bytes: int  # in the arrays of model, state and work
+    kernels: dict[tuple[str, str], Cost]  # of each kernel or memory operation, by stage and name
 
     @property
     def stages(self) -> dict[str, Cost]:
@@ -146,7 +137,7 @@ class _Window:
         return capture.graph
 
     def replay(self, graph: wp.Graph) -> list[float]:
-        """Time of each step [ms]; on a GPU, where steps queue up, that of all."""
+        """Time of each step [ms]."""
         self.restore()
         cpu = self._device.is_cpu
         clock = thread_time if cpu else perf_counter
@@ -154,10 +145,8 @@ class _Window:
         marks = [clock()]
         for _ in range(self._steps):
             wp.capture_launch(graph)
-            if cpu:
-                marks.append(clock())
-        if not cpu:
-            wp.synchronize_device(self._device)
+            if not cpu:
+                wp.synchronize_device(self._device)
             marks.append(clock())
         return [1e3 * (end - start) for start, end in pairwise(marks)]
 

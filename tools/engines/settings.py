@@ -10,23 +10,14 @@ STIFFNESSES = 0.01, 0.1, 1.0, 10.0, 100.0  # of that of the task
 
 @dataclass(frozen=True)
 class Own:
-    """A response of this package at one setting.
-
-    Attributes:
-        method: name of the method
-        search: of a contact surface; empty for other responses
-        iterations: of that search
-        factor: substeps over those that the simulation takes by itself; 1 leaves it to it
-        times: stiffness of a penalty over that of the task; 0 for other responses
-        surfaces: whether surfaces are moved; False leaves the contact to the impulses
-    """
+    """A response of this package at one setting."""
 
     method: str
-    search: str = ""
-    iterations: int = 4
-    factor: int = 1
-    times: float = 0.0
-    surfaces: bool = True
+    search: str = ""  # of a contact surface; empty for other responses
+    iterations: int = 4  # of that search
+    factor: int = 1  # substeps over those that the simulation takes by itself; 1 leaves it to it
+    times: float = 0.0  # stiffness of a penalty over that of the task; 0 for other responses
+    surfaces: bool = True  # are moved; False leaves the contact to the impulses
 
     def __str__(self):
         """The knobs."""

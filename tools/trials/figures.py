@@ -1,8 +1,8 @@
 """The scenes of the paper as they are, the sphere squeezed further; blocks that no one chose.
 
-``tilts`` are the collisions of ``verification/collision.py`` with rotation, place, cells and stiffness
-drawn anew for each number. Corners slide over facets that they bend, and pass each other tip on
-tip.
+``tilts`` are the collisions of ``verification/collision.py``, with rotation, place, cells and
+stiffness drawn anew for each number. Corners slide over facets that they bend, and pass each other
+tip on tip.
 """
 
 from collections.abc import Iterator

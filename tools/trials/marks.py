@@ -29,22 +29,14 @@ CLOSE = 0.04  # of a map: marks that are nearer share one
 
 
 class Pair(NamedTuple):
-    """Two bodies of a scene, by label.
-
-    Attributes:
-        upper, lower: the bodies
-        above: bodies like the upper one on the lower
-        fall: height that the upper body falls to the first impact [m]
-        speed: of the upper body where it is driven [m/s]
-        overlap: at the start [m]
-    """
+    """Two bodies of a scene, by label."""
 
     upper: str
     lower: str
-    above: int = 1
-    fall: float = 0.0
-    speed: float = 0.0
-    overlap: float = 0.0
+    above: int = 1  # bodies like the upper one on the lower
+    fall: float = 0.0  # of the upper body to the first impact [m]
+    speed: float = 0.0  # of the upper body where it is driven [m/s]
+    overlap: float = 0.0  # at the start [m]
 
 
 BLOCKS = [Pair(f"{k}_upper", f"{k}_lower", overlap=0.01) for k in ("equal", "unequal")]

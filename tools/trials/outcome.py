@@ -33,42 +33,24 @@ BEYOND = "beyond"  # expected of what has a meaning, but not for this method
 
 @dataclass
 class Record:
-    """Figures of a run.
+    """Figures of a run."""
 
-    Attributes:
-        refused: the error before the first step
-        error: the error that ended the run
-        finite: whether all positions and velocities were numbers
-        lost: who was on whose wrong side
-        tunnelled: points that went through another body; 0 for a run that starts with an overlap
-        through: the bodies of the last of them
-        overlap: deepest of all frames, or of the last one for a run that starts with an overlap;
-            of the smallest extent of a body
-        gained: largest rise of the energy over its scale; 0 for bodies that are driven
-        volume: smallest volume of a tet at the end, of that at rest
-        lowest: the same at any frame
-        touched: whether there was any contact
-        steps: taken
-        time: of the run [s]
-        asked: time that it should have lasted [s]
-        note: a further figure, in words
-    """
-
-    refused: str = ""
-    error: str = ""
-    finite: bool = True
-    lost: str = ""
-    tunnelled: int = 0
-    through: tuple[str, str] | None = None
+    refused: str = ""  # the error before the first step
+    error: str = ""  # the error that ended the run
+    finite: bool = True  # all positions and velocities were numbers
+    lost: str = ""  # who was on whose wrong side
+    tunnelled: int = 0  # points that went through another body, if it started without an overlap
+    through: tuple[str, str] | None = None  # the bodies of the last of them
+    # Deepest of all frames, or of the last one if it started with one; of the thinnest body.
     overlap: float = 0.0
-    gained: float = 0.0
-    volume: float = 1.0
-    lowest: float = 1.0
-    touched: bool = False
-    steps: int = 0
-    time: float = 0.0
-    asked: float = 0.0
-    note: str = ""
+    gained: float = 0.0  # largest rise of the energy over its scale; 0 for bodies that are driven
+    volume: float = 1.0  # smallest volume of a tet at the end, of that at rest
+    lowest: float = 1.0  # the same at any frame
+    touched: bool = False  # there was some contact
+    steps: int = 0  # taken
+    time: float = 0.0  # of the run [s]
+    asked: float = 0.0  # that it should have lasted [s]
+    note: str = ""  # a further figure, in words
 
     @property
     def reason(self) -> str:

@@ -16,45 +16,28 @@ BASE = 0.01  # of its height: vertices that are no further from its lowest ones 
 
 @dataclass
 class Setting:
-    """A scene, how long to run it and what to look at.
-
-    Attributes:
-        scene: as it starts
-        seconds: how long [s]
-        fps: frames per second
-        substeps: of a frame; None leaves it to the solver
-        pairs: indices of two bodies and the unit vector from the first to the second, upwards if
-            left out; None watches each body and the next
-        recovers: it starts with an overlap; only that at the end counts, and no body may pop
-        held: lower bound of the elastic energy with that overlap closed before anything moves [J]
-        drive: called before each frame; the energy is then not judged
-    """
+    """A scene, how long to run it and what to look at."""
 
     scene: wc.Scene
-    seconds: float
+    seconds: float  # [s]
     fps: float = 200.0
-    substeps: int | None = None
+    substeps: int | None = None  # of a frame; None leaves it to the solver
+    # Indices of two bodies and the unit vector from the first to the second, upwards if left out;
+    # None watches each body and the next.
     pairs: tuple | None = None
-    recovers: bool = False
-    held: float = 0.0
-    drive: Callable | None = None
+    recovers: bool = False  # it starts with an overlap: only that at the end counts, none may pop
+    held: float = 0.0  # lower bound of the elastic energy with that overlap closed at once [J]
+    drive: Callable | None = None  # called before each frame; the energy is then not judged
 
 
 @dataclass(frozen=True)
 class Case:
-    """One case.
+    """A setting, and what ought to come of it."""
 
-    Attributes:
-        name: number in the specification and a few words
-        build: its setting; raises ValueError where the input is refused
-        expect: ``fine``, ``refused``, or ``beyond`` for what is refused though it has a meaning
-        limit: seconds that it may take
-    """
-
-    name: str
-    build: Callable[[], Setting]
-    expect: str = FINE
-    limit: float = 120.0
+    name: str  # number in the specification and a few words
+    build: Callable[[], Setting]  # raises ValueError where the input is refused
+    expect: str = FINE  # or ``refused``, or ``beyond``: refused though it has a meaning
+    limit: float = 120.0  # seconds that it may take
 
 
 def case(name: str, build: Callable, *args, expect=FINE, limit=120.0, **named) -> Case:

@@ -16,22 +16,15 @@ MOST_STEPS = 600, 6000  # of a cell in a quick and in a full run; a run that is 
 
 @dataclass(frozen=True)
 class Sweep:
-    """One sweep.
-
-    Attributes:
-        title: what is swept
-        x_name, y_name: what the axes are, with their units
-        x, y: first and last value of both, spaced by equal factors
-        build: the setting of a cell
-        limit: where something else than contact decides: its name, and y at each x
-    """
+    """What is swept, and how."""
 
     title: str
-    x_name: str
+    x_name: str  # with its unit
     y_name: str
-    x: tuple[float, float]
+    x: tuple[float, float]  # first and last value, spaced by equal factors
     y: tuple[float, float]
-    build: Callable[[float, float], Setting]
+    build: Callable[[float, float], Setting]  # of a cell
+    # Where something else than contact decides: its name, and y at each x.
     limit: tuple[str, Callable[[np.ndarray], np.ndarray]] | None = None
 
     def axes(self, quick: bool) -> tuple[np.ndarray, np.ndarray]:

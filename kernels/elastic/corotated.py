@@ -8,9 +8,8 @@
 F = R S is the polar decomposition with det R = +1 even for an inverted tet, whose S then has
 one negative eigenvalue. mu, lam are the Lame parameters [Pa], beta the damping time [s] of the
 viscous stress in ``tet.viscous_stress``. For a Poisson ratio of 0 a bar stretched by s carries
-P = E (s - 1). A row of ``param`` is (mu, lam, beta).
-
-R comes from the closed form of Markley, which maximises tr(R^T F) over the rotations:
+P = E (s - 1). R comes from the closed form of Markley, which maximises tr(R^T F) over the
+rotations:
 
     R = ((k + |F|^2) F + y cof F - F F^T F) / z,  k = (y^2 - |F|^2)/2,  z = k y - J
     y   largest root of y^4 - 2 |F|^2 y^2 - 8 J y + |F|^4 - 4 |cof F|^2
@@ -25,11 +24,12 @@ Markley 1993, "Attitude determination using vector observations: a fast optimal 
 import warp as wp
 
 from warp_contact.kernels.elastic import tet as element
+from warp_contact.kernels.elastic.hyperelastic import ROW, kernels_of
 from warp_contact.kernels.options import ARITHMETIC
 
 wp.set_module_options(ARITHMETIC)
 
-ROW = wp.vec3  # of param
+__all__ = ["ROW", "apply_damping", "apply_stiffness", "energies", "set_forces"]
 
 NEWTON = wp.constant(8)  # most steps from sqrt(3) |F|, which is above the root and exact at rest
 ROUNDING = wp.constant(1.0e-6)  # of the quartic in y, relative to |F|^4
@@ -102,87 +102,6 @@ def energy_density(g: wp.mat33, mu: float, lam: float) -> float:
     return mu * wp.ddot(strain, strain) + 0.5 * lam * j * j
 
 
-@wp.kernel
-def set_forces(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    mask: wp.array[int],  # (n_tet,) tets with 0 are skipped
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner forces, minus the energy gradient."""
-    r = wp.tid()
-    q = tet[r]
-    if mask[q] == 0:
-        return
-    g = element.displacement_gradient(q, tets, pose, x)
-    m = -volume[q] * param[r]  # stresses are linear in the moduli
-    element.store_stress(q, stress(g, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def apply_stiffness(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    dx: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner entries of K(x) dx."""
-    r = wp.tid()
-    q = tet[r]
-    g = element.displacement_gradient(q, tets, pose, x)
-    df = element.rate(q, tets, pose, dx)
-    m = volume[q] * param[r]
-    element.store_stress(q, stress_differential(g, df, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def apply_damping(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner entries of C(x) v."""
-    r = wp.tid()
-    q = tet[r]
-    f = element.rate(q, tets, pose, x)
-    df = element.rate(q, tets, pose, v)
-    m = volume[q] * param[r][2] * param[r]
-    element.store_stress(q, element.viscous_stress(f, df, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def energies(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    energy: wp.array[float],  # (n_tet,) [J]
-):
-    """One thread per tet of the model: set its elastic energy."""
-    r = wp.tid()
-    q = tet[r]
-    g = element.displacement_gradient(q, tets, pose, x)
-    energy[q] = volume[q] * energy_density(g, param[r][0], param[r][1])
+set_forces, apply_stiffness, apply_damping, energies = kernels_of(
+    stress, stress_differential, energy_density, __name__
+)

@@ -15,8 +15,6 @@ along its axis, for a ratio of 0, 0.3 or 0.4; what presses harder turns it insid
 the step. b adds nothing to the pressure above J0, 14 l at J = 1/20 and 32 l at J = 0; l = 1.8 E for
 a ratio of 0.4.
 
-A row of ``param`` is (mu, lam, beta).
-
 Energies are written in the Green strain E = (F^T F - I)/2, because I_C - 3 cancels in float32:
 
     psi = mu (tr E (J - 1) - 4 tr cof E - 8 det E)/(J + 1) + l/2 (J - 1)^2,  J > 0
@@ -27,11 +25,12 @@ Source: Smith, de Goes, Kim 2018, "Stable neo-Hookean flesh simulation".
 import warp as wp
 
 from warp_contact.kernels.elastic import tet as element
+from warp_contact.kernels.elastic.hyperelastic import ROW, kernels_of
 from warp_contact.kernels.options import ARITHMETIC
 
 wp.set_module_options(ARITHMETIC)
 
-ROW = wp.vec3  # of param
+__all__ = ["ROW", "apply_damping", "apply_stiffness", "energies", "set_forces"]
 
 
 SQUASHED = wp.constant(0.25)  # J0
@@ -90,87 +89,6 @@ def energy_density(g: wp.mat33, mu: float, lam: float) -> float:
     return mu * shear + (lam + mu) * (0.5 * j * j + barrier(j)[0])
 
 
-@wp.kernel
-def set_forces(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    mask: wp.array[int],  # (n_tet,) tets with 0 are skipped
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner forces, minus the energy gradient."""
-    r = wp.tid()
-    q = tet[r]
-    if mask[q] == 0:
-        return
-    g = element.displacement_gradient(q, tets, pose, x)
-    m = -volume[q] * param[r]  # stresses are linear in the moduli
-    element.store_stress(q, stress(g, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def apply_stiffness(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    dx: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner entries of K(x) dx."""
-    r = wp.tid()
-    q = tet[r]
-    g = element.displacement_gradient(q, tets, pose, x)
-    df = element.rate(q, tets, pose, dx)
-    m = volume[q] * param[r]
-    element.store_stress(q, stress_differential(g, df, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def apply_damping(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner entries of C(x) v."""
-    r = wp.tid()
-    q = tet[r]
-    f = element.rate(q, tets, pose, x)
-    df = element.rate(q, tets, pose, v)
-    m = volume[q] * param[r][2] * param[r]
-    element.store_stress(q, element.viscous_stress(f, df, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def energies(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    energy: wp.array[float],  # (n_tet,) [J]
-):
-    """One thread per tet of the model: set its elastic energy."""
-    r = wp.tid()
-    q = tet[r]
-    g = element.displacement_gradient(q, tets, pose, x)
-    energy[q] = volume[q] * energy_density(g, param[r][0], param[r][1])
+set_forces, apply_stiffness, apply_damping, energies = kernels_of(
+    stress, stress_differential, energy_density, __name__
+)

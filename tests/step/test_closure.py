@@ -1,17 +1,17 @@
-"""The closure: gaps closed to the resting gap, centres of mass kept, moves bounded."""
-
-import math
+"""surface.py: gaps closed to the resting gap, centres of mass kept, moves bounded."""
 
 import numpy as np
 import pytest
 import warp as wp
 
-from warp_contact import ContactSurface, NeoHookean, Scene, box
-from warp_contact.step import surface
+from warp_contact import NeoHookean, Scene, box
+from warp_contact.kernels.surface.residual import TOLERANCE
+from warp_contact.step import residual, search, surface
 
 EDGE = 0.25  # of a cell [m]
-REST = 2e-4  # of an edge: kernels/contact.py
+REST = 2e-4  # of an edge: kernels/narrow_phase/contact.py
 DT = 1e-3
+ITERATIONS = 4  # of the search, as by default
 
 
 def stacked(rng, jittered, overlap: float, densities=(1000.0, 3000.0), v=(0.0, 0.0, 0.0)) -> Scene:
@@ -34,8 +34,8 @@ def closed(scene: Scene, stages, find_contacts, records) -> tuple:
     model, state, work = stages(scene, dt=DT)
     find_contacts(model, work, state.x)
     x0, v0 = state.x.numpy().astype(float), state.v.numpy().astype(float)
-    surface.leftover(model, state.x, work)
-    surface.close(model, state.x, state.v, work, math.inf)
+    residual.find_gaps(model, state.x, work)
+    surface.close_all(model, state, work)
     x1, v1 = state.x.numpy().astype(float), state.v.numpy().astype(float)
     return model, (x0, x1), (v0, v1), records(work)
 
@@ -54,12 +54,12 @@ def test_a_small_overlap_is_closed_to_the_resting_gap(
 ):
     scene = stacked(rng, jittered, overlap=0.015 * EDGE)
     model, (_, x1), _, c = closed(scene, stages, find_contacts, records)
-    used = c.left > 0.0
+    used = c.residual > 0.0
     gap = (gaps(c, x1) / edges_of(model, c))[used]
     assert len(gap) > 0
     # What the passes stop at, and the rounding of coordinates of three edges. In one draw of 40 a
     # vertex that several contacts share has not got there after the last of them.
-    assert np.median(gap) > REST - surface.TOLERANCE - 1e-5 and gap.min() > -5e-4
+    assert np.median(gap) > REST - TOLERANCE - 1e-5 and gap.min() > -5e-4
     # Only contacts that others lifted end above it.
     assert gap.min() < REST + 1e-5
 
@@ -95,14 +95,14 @@ def test_a_deep_overlap_is_resolved_by_a_bounded_part(
     scene = stacked(rng, jittered, overlap=0.5 * EDGE)
     model, (x0, x1), _, c = closed(scene, stages, find_contacts, records)
     edge = edges_of(model, c)
-    used = c.left > surface.BOUND * edge
+    used = c.residual > search.BOUND * edge
     resolved = ((gaps(c, x1) - gaps(c, x0)) / edge)[used]
     assert used.sum() > 10
     # Everything by the bound at least, but for 5 % that the passes leave; what neighbours lift goes
     # further.
-    assert resolved.min() > 0.95 * surface.BOUND
-    assert np.median(resolved) < 2.0 * surface.BOUND
-    assert np.linalg.norm(x1 - x0, axis=1).max() < 4.0 * surface.BOUND * edge.max()
+    assert resolved.min() > 0.95 * search.BOUND
+    assert np.median(resolved) < 2.0 * search.BOUND
+    assert np.linalg.norm(x1 - x0, axis=1).max() < 4.0 * search.BOUND * edge.max()
 
 
 def test_fixed_vertices_do_not_move_and_planes_stay_where_they_are(
@@ -138,11 +138,10 @@ def test_an_overlap_of_before_the_step_is_left_to_the_search(stages, find_contac
     model, state, work = stages(scene, dt=DT)
     find_contacts(model, work, state.x)
     x0 = state.x.numpy().copy()
-    surface.leftover(model, state.x, work)
-    surface.begin_search(model, state.x, work)
-    surface.balance(model, state.x, work, ContactSurface())
+    residual.find_gaps(model, state.x, work)
+    search.balance(model, state.x, work, ITERATIONS)
     found = state.x.numpy().copy()
-    surface.close(model, state.x, state.v, work, surface.DEEP)
+    surface.close(model, state, work)
     # The closure has nothing to add to what was found.
     np.testing.assert_array_equal(state.x.numpy(), found)
     moves = found[:, 2] - x0[:, 2]
@@ -151,12 +150,12 @@ def test_an_overlap_of_before_the_step_is_left_to_the_search(stages, find_contac
     moved = inner & (np.abs(moves) > 1e-3 * EDGE)
     down, up = -moves[moved & ~upper], moves[moved & upper]
     assert len(up) == len(down) == 9
-    if overlap < surface.BOUND * EDGE:
+    if overlap < search.BOUND * EDGE:
         # Springs in series, but for strains of 0.01.
         np.testing.assert_allclose(up, overlap / (1.0 + ratio), atol=0.01 * overlap)
         np.testing.assert_allclose(down, overlap * ratio / (1.0 + ratio), atol=0.01 * overlap)
     else:
-        assert np.abs(moves).max() <= surface.BOUND * model.body_edge.numpy().max() * (1.0 + 1e-3)
+        assert np.abs(moves).max() <= search.BOUND * model.body_edge.numpy().max() * (1.0 + 1e-3)
 
 
 def test_a_vertex_that_left_its_triangle_is_looked_at_again(rng, stages, find_contacts, jittered):
@@ -168,18 +167,22 @@ def test_a_vertex_that_left_its_triangle_is_looked_at_again(rng, stages, find_co
         x = state.x.numpy()
         x[model.vert_body.numpy() == 1, 0] += np.float32(way)
         moved = wp.array(x, dtype=wp.vec3)
-        surface.leftover(model, moved, work)
-        assert work.found.numpy().tolist() == [0, 0]  # no overlap is worth a move
-        surface.leftover(model, moved, work, strays=True)
-        assert work.found.numpy().tolist() == [stray, 0]
+        residual.find_gaps(model, moved, work)
+        assert work.surface.of_step.numpy().tolist() == [0, 0]  # no overlap is worth a move
+        residual.find_gaps(model, moved, work)
+        residual.add_strays(model, moved, work)
+        assert work.surface.of_step.numpy().tolist() == [stray, 0]
 
 
 def test_a_vertex_below_its_triangle_is_looked_at_again(rng, stages, find_contacts, jittered):
     """Although its gap, along a direction within the triangle's plane, is closed."""
     model, state, work = stages(stacked(rng, jittered, overlap=1e-3 * EDGE), dt=DT)
     assert find_contacts(model, work, state.x).n > 0
-    work.contacts.normal.fill_(wp.vec3(1.0, 0.0, 0.0))
-    surface.leftover(model, state.x, work)
-    assert work.found.numpy().tolist() == [0, 0]
-    surface.leftover(model, state.x, work, strays=True)
-    assert work.found.numpy().tolist() == [1, 0]
+    record = work.contacts.record.numpy()
+    record["normal"] = 1.0, 0.0, 0.0
+    work.contacts.record.assign(record)
+    residual.find_gaps(model, state.x, work)
+    assert work.surface.of_step.numpy().tolist() == [0, 0]
+    residual.find_gaps(model, state.x, work)
+    residual.add_strays(model, state.x, work)
+    assert work.surface.of_step.numpy().tolist() == [1, 0]

@@ -1,11 +1,11 @@
-"""surface.py: the searches for equal pressure, as printed and balanced."""
+"""search.py: the searches for equal pressure, as printed and balanced."""
 
 import numpy as np
 import pytest
 import warp as wp
 
 from warp_contact import ContactSurface, NeoHookean, Scene, box
-from warp_contact.step import forces, surface
+from warp_contact.step import forces, residual, search
 
 EDGE = 0.1  # of a block [m]
 OVERLAP = 1e-4  # [m]: small strains, but 1e4 roundings
@@ -23,17 +23,16 @@ def blocks(ratio: float, cells=(4, 4), overlap: float = OVERLAP, young: float = 
 def searched(scene: Scene, stages, find_contacts, records, response: ContactSurface) -> tuple:
     model, state, work = stages(scene)
     find_contacts(model, work, state.x)
-    surface.leftover(model, state.x, work)
-    surface.begin_search(model, state.x, work)
-    search = surface.balance if response.search == "balanced" else surface.bisect
-    search(model, state.x, work, response)
+    residual.find_gaps(model, state.x, work)
+    move = search.balance if response.search == "balanced" else search.bisect
+    move(model, state.x, work, response.iterations)
     return model, state, work, records(work)
 
 
 def inner(model, work) -> list[np.ndarray]:
     """Displacement vertices of each body away from the rim, where s is along z."""
     x = work.x.numpy()
-    region = np.linalg.norm(work.s.numpy(), axis=1) > 0.5 * OVERLAP
+    region = np.linalg.norm(work.surface.s.numpy(), axis=1) > 0.5 * OVERLAP
     region &= np.abs(x[:, :2]).max(axis=1) < 0.4 * EDGE
     return [np.flatnonzero(region & (model.vert_body.numpy() == body)) for body in (0, 1)]
 
@@ -45,7 +44,7 @@ def test_balanced_shares_the_overlap_like_two_springs(stages, find_contacts, rec
     )
     lower, upper = inner(model, work)
     assert len(lower) == len(upper) == 9
-    share = work.fraction.numpy()
+    share = work.surface.fraction.numpy()
     # Strain 4e-3 in the cells at the surface, to whose order neo-Hookean is not linear.
     np.testing.assert_allclose(share[lower], ratio / (1.0 + ratio), atol=5e-3)
     np.testing.assert_allclose(share[upper], 1.0 / (1.0 + ratio), atol=5e-3)
@@ -58,7 +57,7 @@ def test_literal_shares_the_overlap_within_its_last_step(stages, find_contacts, 
         blocks(ratio), stages, find_contacts, records, ContactSurface("literal")
     )
     lower, upper = inner(model, work)
-    share = work.fraction.numpy()
+    share = work.surface.fraction.numpy()
     # Steps 1/4, 1/8, 1/16, 1/32: what is left is at most the last, and the strain as above.
     assert np.abs(share[lower] - ratio / (1.0 + ratio)).max() <= 1.0 / 32.0 + 5e-3
     assert np.abs(share[upper] - 1.0 / (1.0 + ratio)).max() <= 1.0 / 32.0 + 5e-3
@@ -73,11 +72,10 @@ def test_a_side_that_is_pressed_already_yields_less_or_more(stages, find_contact
     x[lower, 2] *= 1.0 - strain
     state.x.assign(x)
     find_contacts(model, work, state.x)
-    surface.leftover(model, state.x, work)
-    surface.begin_search(model, state.x, work)
+    residual.find_gaps(model, state.x, work)
     # An imbalance is corrected by a quarter at a time: 0.75^15 of it is left.
-    surface.balance(model, state.x, work, ContactSurface(iterations=16))
-    share = work.fraction.numpy()
+    search.balance(model, state.x, work, iterations=16)
+    share = work.surface.fraction.numpy()
     one, two = inner(model, work)
     assert len(one) == len(two) == 9
     # Nonlinear to the order of the strains of 4e-3; float32 forces at a strain of 2e-3.
@@ -91,10 +89,10 @@ def test_both_sides_of_the_balanced_search_meet(rng, stages, find_contacts, reco
         material = NeoHookean(1e5 * rng.uniform(1.0, 5.0), 0.3, 1000.0)
         scene.add_body(jittered(EDGE, cells, 0.2), material, (0.0, 0.0, 0.95 * k * EDGE))
     _, _, work, c = searched(scene, stages, find_contacts, records, ContactSurface("balanced"))
-    share = work.fraction.numpy().astype(float)
-    region = np.linalg.norm(work.s.numpy(), axis=1) > 0.0
+    share = work.surface.fraction.numpy().astype(float)
+    region = np.linalg.norm(work.surface.s.numpy(), axis=1) > 0.0
     up, lo = mean_over(c, [0, 1], share, region), mean_over(c, [2, 3, 4], share, region)
-    total = (up + lo)[c.left > 0.0]
+    total = (up + lo)[c.residual > 0.0]
     print(f"off by {np.abs(total - 1.0).mean():.3f}, {total.min():.3f} to {total.max():.3f}")
     assert len(total) > 20
     # Where the meshes do not match, interpolation to and fro leaves this much of an overlap.
@@ -127,7 +125,7 @@ def literal_fractions(model, c, x0: np.ndarray, s: np.ndarray, iterations: int) 
         upper, lower = mean_over(c, [0, 1], own, region), mean_over(c, [2, 3, 4], own, region)
         touch, weight = np.zeros(len(a)), np.zeros(len(a))
         inside, inside_weight = np.zeros(len(a)), np.zeros(len(a))
-        for j in np.flatnonzero(c.left > 0.0):
+        for j in np.flatnonzero(c.residual > 0.0):
             for m in range(5):
                 i, w = c.vert[j, m], abs(c.coef[j, m])
                 if m < 2:
@@ -150,9 +148,10 @@ def test_the_literal_search_takes_the_printed_steps(rng, stages, find_contacts, 
         scene.add_body(jittered(1.0, 4), NeoHookean(young, 0.3, 1000.0), (0.0, 0.0, z))
     response = ContactSurface("literal", iterations=4)
     model, state, work, c = searched(scene, stages, find_contacts, records, response)
-    x0, s = work.x.numpy().astype(float), work.s.numpy().astype(float)
+    x0, s = work.x.numpy().astype(float), work.surface.s.numpy().astype(float)
     region = np.linalg.norm(s, axis=1) > 0.0
-    ours, printed = work.fraction.numpy()[region], literal_fractions(model, c, x0, s, 4)[region]
+    ours = work.surface.fraction.numpy()[region]
+    printed = literal_fractions(model, c, x0, s, 4)[region]
     assert region.sum() > 20 and len(np.unique(ours)) > 2
     # A sign may differ where both pressures agree to rounding, and neighbours of that vertex then.
     assert (np.abs(ours - printed) < 1e-6).mean() > 0.95
@@ -173,19 +172,18 @@ def test_a_uniform_pressure_is_the_same_on_both_sides_whatever_the_density(
     x[upper, 2] -= OVERLAP
     state.x.assign(x)
     find_contacts(model, work, state.x)
-    surface.leftover(model, state.x, work)
-    surface.begin_search(model, state.x, work)
-    surface.balance(model, state.x, work, ContactSurface(iterations=2))
+    residual.find_gaps(model, state.x, work)
+    search.balance(model, state.x, work, iterations=2)
     c = records(work)
-    traction = work.before.numpy()
+    traction = work.surface.at_start.numpy()
     for side in inner(model, work):
         assert len(side) >= 4
         # Nonlinear to the order of the strain, against E strain.
         np.testing.assert_allclose(traction[side], young * strain, rtol=2.0 * strain)
         # float32 positions against strains of 0.02 over a cell of EDGE / 7.
         np.testing.assert_allclose(traction[side], traction[side].mean(), rtol=1e-3)
-    up, lo = work.upper_mean.numpy()[: c.n, 0], work.lower_mean.numpy()[: c.n, 0]
+    up, lo = work.surface.upper_mean.numpy()[: c.n, 0], work.surface.lower_mean.numpy()[: c.n, 0]
     rim = np.abs(x[c.vert, :2]).max(axis=(1, 2)) > 0.4 * EDGE
-    used = (c.left > 0.0) & ~rim
+    used = (c.residual > 0.0) & ~rim
     assert used.any()
     np.testing.assert_allclose(up[used], lo[used], rtol=1e-3)

@@ -12,8 +12,9 @@ import warp as wp
 from clock.memory import Snapshot, held
 from clock.timer import StageTimer
 from warp_contact import Simulation
-from warp_contact.step import step as stages
 from warp_contact.step.forces import share_for, stages_for
+from warp_contact.step.loop import step_of
+from warp_contact.step.motion import drift, predict
 
 WORK = 60_000  # vertices times steps of a window
 LEAST, MOST = 8, 64  # steps
@@ -70,7 +71,7 @@ def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
     steps = steps or min(MOST, max(LEAST, WORK // sim.model.n_vert))
     with wp.ScopedDevice(sim.device):
         window = _fitting(sim, steps)
-        step, elastic = window.capture(stages.step), window.capture(_elastic)
+        step, elastic = window.capture(window.step), window.capture(_elastic)
         runs = []
         for _ in range(repeats):
             runs.append((window.replay(step), window.replay(elastic), window.operations()))
@@ -94,9 +95,9 @@ def _mean_of_medians(runs: tuple[list[float], ...], steps: int) -> float:
     return sum(median(times) for times in zip(*runs, strict=True)) / steps
 
 
-def _elastic(model, state, work, response, n_stages, search, unit) -> None:
-    stages.predict(model, state, work, n_stages)
-    stages.drift(model, state, work, state.x)
+def _elastic(model, state, work, stages: int) -> None:
+    predict(model, state, work, stages)
+    drift(model, state, work, state.x)
 
 
 def _fitting(sim: Simulation, steps: int) -> "_Window":
@@ -104,11 +105,11 @@ def _fitting(sim: Simulation, steps: int) -> "_Window":
     for _ in range(ATTEMPTS):
         window, stepper = _Window(sim, steps), sim._stepper
         window.operations()
-        needed = stepper.work.contacts.needed.numpy().copy()
+        needed = stepper.work.overflow.all.numpy().copy()
         if not needed.any():
             return window
         window.restore()
-        stepper.work.contacts.needed.assign(needed)
+        stepper.work.overflow.all.assign(needed)
         stepper.grow()
         stepper.work.dt.fill_(stepper.dt)
     raise RuntimeError("contacts outgrow their buffers in every window")
@@ -120,16 +121,17 @@ class _Window:
         stepper = sim._stepper
         self._work, self._device = stepper.work, sim.device
         self._work.share.fill_(share_for(stepper.rates[1], stepper.dt))
-        self._arguments = sim.model, sim.state, self._work, sim.response
-        self._arguments += stages_for(stepper.rates[1], stepper.dt), stepper.search, stepper.unit
-        self._work.contacts.needed.zero_()
+        self.step = step_of(sim.response, bool(stepper.search))
+        stages = stages_for(stepper.rates[1], stepper.dt)
+        self._arguments = sim.model, sim.state, self._work, stages
+        self._work.overflow.all.zero_()
         self._start = Snapshot(sim.state, self._work)
         self.contacts: list[int] = []
 
     def restore(self) -> None:
         self._start.restore()
-        self._work.bodies.refit()
-        self._work.surface.refit()
+        self._work.broad_phase.bodies.refit()
+        self._work.broad_phase.surface.refit()
 
     def capture(self, step) -> wp.Graph:
         with wp.ScopedCapture() as capture:
@@ -156,6 +158,6 @@ class _Window:
         self.contacts.clear()
         with StageTimer(self._device) as timer:
             for _ in range(self._steps):
-                stages.step(*self._arguments)
+                self.step(*self._arguments)
                 self.contacts.append(int(self._work.contacts.n.numpy()[0]))
         return timer.operations

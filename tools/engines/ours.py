@@ -1,8 +1,7 @@
 """Run a task with a response of this package."""
 
-from contextlib import nullcontext
+from contextlib import ExitStack
 from functools import partial
-from unittest import mock
 
 import numpy as np
 
@@ -10,7 +9,7 @@ import warp_contact as wc
 from engines.job import play
 from engines.settings import Own
 from engines.task import Failed, Motion, Task
-from warp_contact.step import step
+from warp_contact.data.switches import without
 
 
 class Engine:
@@ -54,8 +53,9 @@ def run(task: Task, setting: Own, substeps: int | None, limit: float) -> Motion:
         limit: wall seconds after which the run is given up
     """
     make = partial(Engine, task, setting.response(task), substeps)
-    still = nullcontext() if setting.surfaces else mock.patch.object(step, "move_surfaces")
-    with still:
+    with ExitStack() as still:
+        for part in () if setting.surfaces else ("search", "closure"):
+            still.enter_context(without(part))
         try:
             found = play(make, task.fps, task.frames, task.stop, limit)
         except wc.SimulationError as error:

@@ -51,28 +51,33 @@ def render(
     """
     stage = stage if isinstance(stage, Usd.Stage) else open_stage(stage)
     every, drawing = frame_numbers(stage), Drawing.of(stage)
-    frames = every if frames is None else list(frames)
-    absent = [frame for frame in frames if frame not in every]
-    if absent:
-        raise ValueError(f"no frame {absent[0]}: the file has {every[0]} to {every[-1]}")
+    frames = chosen_frames(frames, every)
     low, high = drawing.bounds(every)
     camera = chosen_camera(read_view(stage), eye, target, low, high, size[0] / size[1])
     planes = read_planes(stage)
     if floor and not planes:
         planes = [(np.array([0.0, 0.0, 1.0]), float(low[2]))]
-    out_dir, paths = Path(out_dir), []
-    out_dir.mkdir(parents=True, exist_ok=True)
+    paths = [Path(out_dir) / f"{frame:06d}.png" for frame in frames]
+    Path(out_dir).mkdir(parents=True, exist_ok=True)
     with wp.ScopedDevice(device):
         rest = drawing.points(every[0])
         renderer = Renderer(drawing.tris, rest, planes, size, samples, rays, wire)
         reach, center = float(np.linalg.norm(high - low)), 0.5 * (low + high)
-        for frame in frames:
+        for frame, path in zip(frames, paths, strict=True):
             points, colors = drawing.points(frame), drawing.colors(frame)
-            paths.append(out_dir / f"{frame:06d}.png")
-            write_png(paths[-1], renderer.picture(points, colors, camera, center, reach))
+            write_png(path, renderer.picture(points, colors, camera, center, reach))
             if report is not None:
-                report(paths[-1])
+                report(path)
     return paths
+
+
+def chosen_frames(frames: Iterable[int] | None, every: range) -> list[int]:
+    """The frames asked for, or all; raises ValueError for one that is not there."""
+    chosen = list(every if frames is None else frames)
+    absent = [frame for frame in chosen if frame not in every]
+    if absent:
+        raise ValueError(f"no frame {absent[0]}: the file has {every[0]} to {every[-1]}")
+    return chosen
 
 
 @dataclass(frozen=True)

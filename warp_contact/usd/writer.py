@@ -73,11 +73,14 @@ class UsdWriter:
         self.layer = self._declare()
         if resume:
             self._reopen()
-            self._remove(after=self.end)
-            return
+        else:
+            self._begin(topology(self.parts, sim, tets, view))
+
+    def _begin(self, prims: Sdf.Layer) -> None:
+        """Remove an earlier file at the same place, and write what does not change."""
         self.root.unlink(missing_ok=True)
         self._remove()
-        export(topology(self.parts, sim, tets, view), self.root.parent / "topology.usdc")
+        export(prims, self.root.parent / "topology.usdc")
         export(self.layer, self.root.parent / "manifest.usdc")
         self._write_root()
 
@@ -125,6 +128,7 @@ class UsdWriter:
         self.scale = last.customLayerData.get("pressureScale", self.scale)
         self.start, self.end = frame_numbers(stage)[0], frame
         self._write_root()
+        self._remove(after=frame)
 
     def _remove(self, after: int = -1) -> None:
         """Remove the frames after one, and what is unfinished or flattened."""

@@ -5,9 +5,9 @@ from functools import partial
 from unittest import mock
 
 import warp as wp
-from checks import surface as stage_4
-from stable import ratios, sweeps
-from stable.setup import attempt
+from trials import loads, sweeps
+from trials.watch import attempt
+from verification import surface as stage_4
 from verification import weight as static
 from verification.setup import Ask
 
@@ -26,7 +26,7 @@ def overlapping() -> dict[str, float]:
     """Stage 4, overlap of 10 %, 1:10."""
     rows = stage_4.place("", "balanced", wc.Corotated, 0.0, (3, 4), 10.0)
     figure = "surface of the lower block [% of overlap]"
-    return {PLACE: abs(next(row.value for row in rows if row.figure == figure))}
+    return {PLACE: abs(next(row.value for row in rows if row.name == figure))}
 
 
 def deep() -> dict[str, float]:
@@ -47,13 +47,13 @@ def inserted() -> dict[str, float]:
 
 def dense() -> dict[str, float]:
     """Cube on a cube of a 10000th of its density."""
-    case = next(c for c in ratios.cases(False) if "1:10000, heavy" in c.name)
+    case = next(c for c in loads.ratios(False) if "1:10000, heavy" in c.name)
     return {GAINED: max(attempt(case.build, "surface", limit=case.limit).gained, 0.0)}
 
 
 def crushed() -> dict[str, float]:
     """Cube struck by one of 10^4 times its mass."""
-    setting = ratios.heavy(0.1, 5.0)
+    setting = loads.heavy(0.1, 5.0)
     sim = wc.Simulation(setting.scene, fps=setting.fps)
     start = sim.measure().energy
     frames = round(setting.seconds * setting.fps)

@@ -23,7 +23,8 @@ from measure.figure import Figure, relative, rms, zero
 
 import warp_contact as wc
 from verification.setup import Ask, G, forces, masses, vertex_areas, watch
-from warp_contact.step import depth
+from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.step import narrow_phase
 
 wp.set_module_options({"enable_backward": False})
 
@@ -120,15 +121,15 @@ def compare(ask: Ask, ratio: float) -> Iterator[Figure]:
 @contextmanager
 def switched_off(how: str) -> Iterator[None]:
     """Contacts of vertices without weights, in the block of a with statement."""
-    found = depth.vertex_contacts
+    count = narrow_phase.count_contacts
 
-    def vertex_contacts(model, x0, x, work, fresh):
-        found(model, x0, x, work, fresh)
-        c = work.contacts
-        inputs = [how == CLOSEST, model.n_body, c.n, c.pair]
-        wp.launch(level, work.capacity.contacts, inputs, outputs=[c.coef])
+    def count_contacts(work, *others):
+        c, n_body = work.contacts, work.mesh.n_body
+        inputs = [how == CLOSEST, n_body, c.n_vertex]
+        wp.launch(level, work.capacity.contacts, inputs, outputs=[c.record])
+        count(work, *others)
 
-    with patch.object(depth, "vertex_contacts", vertex_contacts):
+    with patch.object(narrow_phase, "count_contacts", count_contacts):
         yield
 
 
@@ -138,20 +139,20 @@ def level(
     closest: bool,
     n_body: int,
     n_contact: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,)
     # in, out
-    coef: wp.array2d[float],  # (capacity, 5), of the triangle's corners from 2 on
+    contact: wp.array[Contact],  # (capacity,)
 ):
     """One thread per contact: one corner of the triangle takes all of it, or each a third."""
     c = wp.tid()
-    if c >= n_contact[0] or pair[c][1] >= n_body or coef[c, 0] == 0.0:
+    if c >= n_contact[0] or contact[c].pair[1] >= n_body or contact[c].coef[0] == 0.0:
         return
+    coef = contact[c].coef  # of the triangle's corners from 2 on
     most = int(2)
     for k in range(3, 5):
-        if coef[c, k] < coef[c, most]:
+        if coef[k] < coef[most]:
             most = k
     for k in range(2, 5):
+        coef[k] = -1.0 / 3.0
         if closest:
-            coef[c, k] = wp.where(k == most, -1.0, 0.0)
-        else:
-            coef[c, k] = -1.0 / 3.0
+            coef[k] = wp.where(k == most, -1.0, 0.0)
+    contact[c].coef = coef

@@ -13,9 +13,11 @@ from measure.figure import Figure, zero
 
 import warp_contact as wc
 from verification.setup import Ask, facing, height
-from warp_contact.data.contacts import Capacity
+from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import Work, allocate_work
-from warp_contact.step import broad_phase, step, surface
+from warp_contact.step import broad_phase, residual, search, surface
+from warp_contact.step.look import look, look_at_vertices
+from warp_contact.step.loop import step_of
 
 EDGE = 0.1  # of a block [m]
 YOUNG, DENSITY = 5e4, 1000.0  # of the lower block [Pa], [kg/m^3]
@@ -36,12 +38,12 @@ SEARCHES = "balanced", "literal"
 def run(ask: Ask) -> Iterator[Figure]:
     """Every combination, whatever the response; the quick run takes one material."""
     materials = list(MATERIALS)[: 1 if ask.quick else None]
-    for search, name, cells, ratio in product(SEARCHES, materials, CELLS, RATIOS):
-        case = f"surface {search} {cells[0]}:{cells[1]} 1:{ratio:g} {name}"
-        yield from place(case, search, *MATERIALS[name], cells, ratio)
+    for way, name, cells, ratio in product(SEARCHES, materials, CELLS, RATIOS):
+        case = f"surface {way} {cells[0]}:{cells[1]} 1:{ratio:g} {name}"
+        yield from place(case, way, *MATERIALS[name], cells, ratio)
 
 
-def prepare(search: str, *block) -> tuple[wc.Simulation, Work]:
+def prepare(way: str, *block) -> tuple[wc.Simulation, Work]:
     """Two blocks that overlap by ``OVERLAP`` in z, the lower one's top at z = ``EDGE``."""
     model, poisson, cells, ratio = block
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
@@ -50,24 +52,23 @@ def prepare(search: str, *block) -> tuple[wc.Simulation, Work]:
     scene.add_body(lower, model(YOUNG, poisson, DENSITY), (0, 0, 0.5 * EDGE))
     high = (0.0, 0.0, 1.5 * EDGE - OVERLAP)
     scene.add_body(upper, model(ratio * YOUNG, poisson, DENSITY), high)
-    sim = wc.Simulation(scene, wc.ContactSurface(search))
+    sim = wc.Simulation(scene, wc.ContactSurface(way))
     work = allocate_work(sim.model, sim.state, ROOM)
     work.dt.fill_(DT)
-    work.bodies.rebuild()
     return sim, work
 
 
 def place(
-    case: str, search: str, model, poisson: float, cells: tuple[int, int], ratio: float
+    case: str, way: str, model, poisson: float, cells: tuple[int, int], ratio: float
 ) -> Iterator[Figure]:
     """Figures of one combination; those of the literal search are shown only."""
     block = model, poisson, cells, ratio
-    sim, work = prepare(search, *block)
+    sim, work = prepare(way, *block)
     calls = settle(sim, work)
-    if work.contacts.needed.numpy().any():
-        raise RuntimeError(f"capacities {work.contacts.needed.numpy()} needed")
+    if work.overflow.all.numpy().any():
+        raise RuntimeError(f"capacities {work.overflow.all.numpy()} needed")
 
-    wanted = search == "balanced"
+    wanted = way == "balanced"
     stiff = ratio * cells[1] / cells[0]  # k of the upper block over that of the lower one
     expected = EDGE - OVERLAP * stiff / (1.0 + stiff)
     most = ((1.0 if cells[0] == cells[1] else 5.0),) if wanted else ()
@@ -89,27 +90,30 @@ def place(
         yield zero(case, f"{figure} [% of overlap]", 100.0 * value / OVERLAP, limits)
     yield Figure(case, "calls of stage 4 until nothing is left", calls)
     figure = "largest speed after one step [of overlap / dt]"
-    speed = first_speed(*prepare(search, *block))
+    speed = first_speed(*prepare(way, *block))
     yield zero(case, figure, speed / (OVERLAP / DT), (1e-6,) if wanted else ())
 
 
 def settle(sim: wc.Simulation, work: Work) -> int:
     """Let stage 4 move the surfaces until nothing is left; return how often it was called."""
-    model, state = sim.model, sim.state
+    model, state, tries = sim.model, sim.state, sim.response.iterations
+    balanced = sim.response.search == "balanced"
     for call in range(CALLS):
         broad_phase.refresh(model, state.x, state.x, work)
-        edges = sim.response.search == "balanced"
-        step.contacts(model, state.x, state.x, work, fresh=False, edges=edges)
-        surface.leftover(model, state.x, work)
-        if not work.found.numpy()[0]:
+        (look if balanced else look_at_vertices)(model, state.x, state.x, work)
+        residual.find_gaps(model, state.x, work)
+        if not work.surface.any_open.numpy()[0]:
             return call
-        step.move_surfaces(model, state, work, sim.response, search=True)
+        if balanced:
+            surface.resolve_overlaps(model, state, work, tries)
+        else:
+            search.bisect(model, state.x, work, tries)
     return CALLS
 
 
 def first_speed(sim: wc.Simulation, work: Work) -> float:
     """Largest speed [m/s] after one full step from rest; the rest shapes carry no force."""
-    step.step(sim.model, sim.state, work, sim.response, stages=0, search=True, unit=1.0)
+    step_of(sim.response, overlapping=True)(sim.model, sim.state, work, 0)
     return float(np.linalg.norm(sim.velocities(), axis=1).max())
 
 

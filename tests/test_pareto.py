@@ -76,9 +76,7 @@ def test_a_run_beyond_its_time_fails_and_says_how_far_it_came():
 
 
 def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
-    import pareto
-    from chart.panel import Panel
-    from engines import outside, settings
+    from engines import ours, runs, settings
     from engines.task import Failed, Motion
 
     own = settings.own(quick=False)
@@ -94,14 +92,30 @@ def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
         taken[setting] = steps
         return Motion(None, None, "", 1.0, 0.0, steps or alone[setting.method, setting.times])
 
-    monkeypatch.setattr(settings, "own", lambda quick: own)
-    monkeypatch.setattr(outside, "ADAPTERS", {})
-    monkeypatch.setattr(pareto.ours, "run", run)
-    points = pareto.one(blocks(), [Panel("A", "title", lambda *_: 0.0)], False, "")
+    monkeypatch.setattr(ours, "run", run)
+    motions = [motion for *_, motion in runs.runs(blocks(), own, {}, "", 1.0)]
     for s, steps in taken.items():
         assert steps == (None if s.factor == 1 else s.factor * alone[s.method, s.times])
-    assert [p.outcome for p in points if p.failed] == ["not finite", "no run with steps x1"]
+    failed = [str(motion) for motion in motions if isinstance(motion, Failed)]
+    assert failed == ["not finite", "no run with steps x1"]
     assert {s.factor for s in taken if s.method == "predicted"} == {1, 2, 4}
+
+
+def test_a_run_that_failed_is_a_point_with_its_reason_in_every_panel():
+    import pareto
+    from chart.panel import Panel
+    from engines.task import Failed, Motion
+
+    def broken(task, motion):
+        raise Failed("bodies apart")
+
+    panels = [Panel("A", "title", lambda *_: 0.5), Panel("B", "title", broken)]
+    found = list(pareto.judge(blocks(), panels, ("m", "1", Failed("too slow", 3.0))))
+    assert [(p.panel, p.outcome, p.wall) for p in found] == [(n, "too slow", 3.0) for n in "AB"]
+    motion = Motion(None, None, "", 1.0, 0.25, 3)
+    first, second = pareto.judge(blocks(), panels, ("m", "1", motion))
+    assert (first.error, first.outcome, first.startup) == (0.5, "ok", 0.25)
+    assert (second.error, second.outcome, second.startup) == (None, "bodies apart", 0.25)
 
 
 def points():
@@ -299,7 +313,7 @@ def test_the_kept_table_is_drawn_without_a_run(tmp_path, monkeypatch):
 
     table = tmp_path / "pareto.csv"
     shutil.copy(Path(TOOLS) / "results" / "pareto" / "pareto.csv", table)
-    monkeypatch.setattr(pareto, "one", None)
+    monkeypatch.setattr(pareto, "runs", None)
     monkeypatch.setattr("sys.argv", ["pareto.py", "--draw", str(table)])
     assert pareto.main() == 0
     assert {p.name for p in tmp_path.iterdir()} == {"pareto.csv", "pareto.png", "summary.png"}

@@ -15,7 +15,7 @@ pictures of a table again, beside it.
 import argparse
 import statistics
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,8 +25,9 @@ import warp as wp
 from chart import closed_forms, points, scenes, words
 from chart.panel import Panel
 from chart.points import Point
-from engines import ours, outside, settings
-from engines.task import Failed, Motion, Task
+from engines import outside, settings
+from engines.runs import Run, runs
+from engines.task import Failed, Task
 from measure import machine
 from measure.run import count, one_of
 
@@ -60,11 +61,14 @@ def main() -> int:
     if args.draw:
         draw(args.draw.parent, titles, points.read(args.draw))
         return 0
+    others = {engine: settings.outside(engine, args.quick) for engine in settings.SWEEPS}
+    limit = QUICK_LIMIT if args.quick else LIMIT
     begin, rounds = perf_counter(), []
     for _ in range(args.repeats or (1 if args.quick else REPEATS)):
         rounds.append([])
         for task, panels in chosen.values():
-            rounds[-1] += one(task, panels, args.quick, args.python)
+            for run in runs(task, settings.own(args.quick), others, args.python, limit):
+                rounds[-1] += judge(task, panels, run)
         # After every round: a long run leaves what it has.
         found = choose([median(same) for same in zip(*rounds, strict=True)])
         save(args.out, head(args.python, len(rounds), perf_counter() - begin), titles, found)
@@ -72,36 +76,9 @@ def main() -> int:
     return 0
 
 
-def one(task: Task, panels: list[Panel], quick: bool, python: str) -> list[Point]:
-    """Every method in one task, printed as they come."""
-    found, steps, limit = [], {}, QUICK_LIMIT if quick else LIMIT
-    for setting in settings.own(quick):
-        alike = setting.method, setting.times
-        try:
-            if setting.factor == 1:
-                motion = ours.run(task, setting, None, limit)
-                steps[alike] = motion.steps
-            elif alike in steps:
-                motion = ours.run(task, setting, setting.factor * steps[alike], limit)
-            else:
-                raise Failed("no run with steps x1")
-        except Failed as failed:
-            motion = failed
-        found += judge(task, panels, setting.method, str(setting), motion)
-    for engine in outside.ADAPTERS:
-        knobs = settings.outside(engine, quick)
-        motions = outside.run(task, engine, knobs, python, limit)
-        for setting, motion in zip(knobs, motions, strict=True):
-            said = ", ".join(f"{key} {value:g}" for key, value in setting.items())
-            found += judge(task, panels, engine, said, motion)
-    return found
-
-
-def judge(
-    task: Task, panels: list[Panel], method: str, setting: str, motion: Motion | Failed
-) -> list[Point]:
-    """The errors of a run in all panels."""
-    found = []
+def judge(task: Task, panels: list[Panel], run: Run) -> Iterator[Point]:
+    """The errors of a run in all panels, printed as they come."""
+    method, setting, motion = run
     for panel in panels:
         point = Point(panel.name, method, setting, motion.wall, None)
         try:
@@ -112,8 +89,7 @@ def judge(
         except Failed as failed:
             point = replace(point, outcome=str(failed))
         print(*point.cells(), sep="  ", flush=True)
-        found.append(point)
-    return found
+        yield point
 
 
 def median(same: tuple[Point, ...]) -> Point:

@@ -16,12 +16,13 @@ fast one.
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import warp as wp
 from chart.scenes import overlaps
-from engines import ours, outside
+from engines import outside
+from engines.runs import runs
 from engines.settings import DEFAULT, SWEEPS
 from engines.task import Failed, Motion, Task
 from measure import machine
@@ -52,6 +53,7 @@ def two_blocks() -> wc.Scene:
     return scene
 
 
+OURS = {DEFAULT.method: "warp_contact"}
 RACES: dict[str, tuple[Callable[[], wc.Scene], float, int]] = {  # scene, [s], settings
     "two_blocks": (two_blocks, 1.0, 2),
     "squeezed_sphere": (scenes.load("squeezed_sphere").build, 1.0, 2),
@@ -77,27 +79,22 @@ def main() -> int:
     for name in args.scenes or RACES:
         build, seconds, settings = RACES[name]
         task = Task(build, FPS, round(seconds * FPS))
-        limits = (1, QUICK_LIMIT) if args.quick else (settings, LIMIT)
-        for engine, motion in race(task, *limits, args.python):
-            lines.append(row(name, task, engine, motion))
+        settings, limit = (1, QUICK_LIMIT) if args.quick else (settings, LIMIT)
+        others = fast_and_plain(settings)
+        for engine, _, motion in runs(task, [DEFAULT], others, args.python, limit):
+            lines.append(row(name, task, OURS.get(engine, engine), motion))
             print(lines[-1], flush=True)
     if args.out:
         args.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return 0
 
 
-def race(
-    task: Task, settings: int, limit: float, python: str
-) -> Iterator[tuple[str, Motion | Failed]]:
-    """Each engine with its motion, or why there is none."""
-    try:
-        yield "warp_contact", ours.run(task, DEFAULT, None, limit)
-    except Failed as failed:
-        yield "warp_contact", failed
-    for engine, values in SETTINGS.items():
-        chosen = [dict(zip(SWEEPS[engine][0], v, strict=True)) for v in values[:settings]]
-        for motion in outside.run(task, engine, chosen, python, limit):
-            yield engine, motion
+def fast_and_plain(count: int) -> dict[str, list[dict]]:
+    """So many settings of each engine outside."""
+    return {
+        engine: [dict(zip(SWEEPS[engine][0], v, strict=True)) for v in values[:count]]
+        for engine, values in SETTINGS.items()
+    }
 
 
 def row(name: str, task: Task, engine: str, motion: Motion | Failed) -> str:

@@ -32,7 +32,7 @@ def draw(names: list[str], quick: bool, out: Path) -> int:
             for method in METHODS:
                 found[method] = sweep(name, method, quick, table.writerow)
                 file.flush()
-            picture(SWEEPS[name], name, quick, found, out / f"{name}.png")
+            picture(SWEEPS[name], quick, found, out / f"{name}.png")
     return 0
 
 

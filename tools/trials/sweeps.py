@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import warp_contact as wc
+from trials import outcome
 from trials.setting import NONE, Setting, body, setting, soft
 
 COARSE, FINE = 5, 11  # cells along each side
@@ -103,3 +104,20 @@ SWEEPS = {
         *("speed [m/s]", "step [s]", (0.1, 100.0), (1e-4, 1e-2), speed_step),
     ),
 }
+
+
+def frontier(grid: list[list[str]]) -> list[tuple[tuple, tuple]]:
+    """The sides between a cell that is fine and one that is not: (x, x), (y, y) of their ends."""
+    fine = np.array(grid) == outcome.FINE
+    right = np.argwhere(fine[:, 1:] != fine[:, :-1]).tolist()
+    above = np.argwhere(fine[1:] != fine[:-1]).tolist()
+    sides = [((i + 0.5, i + 0.5), (j - 0.5, j + 0.5)) for j, i in right]
+    return sides + [((i - 0.5, i + 0.5), (j + 0.5, j + 0.5)) for j, i in above]
+
+
+def limit_line(s: Sweep, xs: np.ndarray, ys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The line of the sweep's limit in cells, x and y, as far as it lies on the map."""
+    last = len(ys) - 1
+    y = last * np.log(s.limit[1](xs) / ys[0]) / np.log(ys[-1] / ys[0])
+    on = (y >= -0.5) & (y <= last + 0.5)
+    return np.flatnonzero(on), y[on]

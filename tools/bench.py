@@ -39,19 +39,16 @@ import of the package; ``warm_frame_s`` and ``cold_frame_s`` are the first frame
 included, with the kernels compiled before and with an empty kernel cache.
 """
 
-import argparse
 import multiprocessing
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
-import warp as wp
-from clock.figures import figures, log_slope
+from clock.figures import figures, log_slope, start_times
 from clock.scenes import FRACTION, Case, cases
-from clock.start import start_times
 from measure import report
 from measure.figure import Figure
-from measure.run import count
+from measure.run import command_line, count
 
 START = "start"  # the case of the times until the first frame
 OVERHEAD = "squeezed_sphere"
@@ -59,9 +56,7 @@ OVERHEAD = "squeezed_sphere"
 
 def main() -> int:
     """Run the cases and print their figures as they come."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("cases", nargs="*", metavar="case", help="of those printed; or all")
     parser.add_argument("--quick", action="store_true", help="small cases, few repeats, no compile")
     parser.add_argument("--large", action="store_true", help="a pile of 1e6 vertices, 4096 worlds")
@@ -78,7 +73,6 @@ def main() -> int:
     if unknown:
         names = ", ".join([*known, START])
         parser.error(f"no case {', '.join(sorted(unknown))}; there are {names}")
-    wp.config.log_level = wp.LOG_WARNING
     timed = {name: case for name, case in known.items() if name in chosen}
     found: dict[str, float] = {}
     repeats = args.repeats or (3 if args.quick else 7)

@@ -23,17 +23,15 @@ Last, frames of 32 blocks in 16 columns [ms]: while they settle, at rest, and as
 sleep let them come from where they else are.
 """
 
-import argparse
 import sys
 
 import numpy as np
-import warp as wp
 from clock.figures import frame_times, log_slope, step_figures
 from clock.scenes import blocks, rows
 from clock.window import Timing, measure
 from measure import report
 from measure.figure import Figure
-from measure.run import count
+from measure.run import command_line, count
 
 from warp_contact import Simulation
 
@@ -46,15 +44,12 @@ TABLE = report.Table(**COLUMNS, step=6, elastic=7, KiB=5, stages=0)
 
 def main() -> int:
     """Measure line by line, then print what follows from them."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--quick", action="store_true", help="one friction, floors not settled")
     parser.add_argument("--repeats", type=count, help="of a window; 5, or 3 with --quick")
     parser.add_argument("--device", help="cpu, cuda:0, ...")
     parser.add_argument("--out", metavar="FILE", help="write all figures there as JSON")
     args = parser.parse_args()
-    wp.config.log_level = wp.LOG_WARNING
     print(TABLE.head())
     found: dict[str, float] = {}
     after: dict[str, float] = {}

@@ -12,7 +12,6 @@ panels and summary.png with four of them, and pareto.txt. ``--draw`` measures no
 pictures of a table again, beside it.
 """
 
-import argparse
 import statistics
 import sys
 from collections.abc import Iterable, Iterator
@@ -21,7 +20,6 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-import warp as wp
 from chart import closed_forms, points, scenes, words
 from chart.panel import Panel
 from chart.points import Point
@@ -29,7 +27,7 @@ from engines import outside, settings
 from engines.runs import Run, runs
 from engines.task import Failed, Task
 from measure import machine
-from measure.run import count, one_of
+from measure.run import command_line, count, one_of
 
 TASKS = {
     "A1": closed_forms.springs,
@@ -45,9 +43,7 @@ REPEATS = 3  # of everything, in turn; times are medians
 
 def main() -> int:
     """Run, draw, write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("tasks", nargs="*", type=one_of(TASKS), metavar="task", help="or all")
     parser.add_argument("--quick", action="store_true", help="fewer settings, each once")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "pareto")
@@ -55,7 +51,6 @@ def main() -> int:
     parser.add_argument("--repeats", type=count, help=f"{REPEATS}, quick: 1")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="a table to draw again")
     args = parser.parse_args()
-    wp.config.log_level = wp.LOG_WARNING
     chosen = {name: TASKS[name](args.quick) for name in args.tasks or TASKS}
     titles = {panel.name: panel.title for _, panels in chosen.values() for panel in panels}
     if args.draw:

@@ -14,12 +14,10 @@ fast one.
     inverted    tets that are inside out after the last frame
 """
 
-import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import warp as wp
 from chart.scenes import overlaps
 from engines import outside
 from engines.runs import runs
@@ -27,7 +25,7 @@ from engines.settings import DEFAULT, SWEEPS
 from engines.task import Failed, Motion, Task
 from measure import machine
 from measure.report import Table
-from measure.run import one_of
+from measure.run import command_line, one_of
 
 import warp_contact as wc
 from warp_contact import scenes
@@ -65,15 +63,12 @@ RACES: dict[str, tuple[Callable[[], wc.Scene], float, int]] = {  # scene, [s], s
 
 def main() -> int:
     """Run, print, write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("scenes", nargs="*", type=one_of(RACES), metavar="scene", help="or all")
     parser.add_argument("--quick", action="store_true", help="the fast settings, runs cut short")
     parser.add_argument("--out", type=Path, help="write the table there too")
     parser.add_argument("--python", default=sys.executable, help="interpreter with the engines")
     args = parser.parse_args()
-    wp.config.log_level = wp.LOG_WARNING
     lines = [f"{machine.line('cpu')}; outside: {outside.versions(args.python)}", "", TABLE.head()]
     print(*lines, sep="\n", flush=True)
     for name in args.scenes or RACES:

@@ -8,14 +8,12 @@ holds none. ``map`` writes ``map.csv``, a row per cell, and a heat map per sweep
 ``plot``); a cell that fails is a result there. The outcomes: tools/trials/outcome.py.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
-import warp as wp
 from measure.figure import MISSED
 from measure.report import Table
-from measure.run import one_of
+from measure.run import command_line, one_of
 from trials import degenerate, figures, limits, loads, maps, shapes
 from trials.outcome import Record, classify, level
 from trials.sweeps import SWEEPS
@@ -38,9 +36,7 @@ OUT = Path(__file__).parent / "results" / "stability"
 
 def main() -> int:
     """Run one of the two parts."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parts = parser.add_subparsers(dest="part", required=True)
     part = parts.add_parser("cases", help="small scenes, an outcome and a level each")
     names = {"nargs": "*", "help": "or all"}
@@ -53,7 +49,6 @@ def main() -> int:
     part.add_argument("--out", type=Path, default=OUT, help="folder of the table and the pictures")
     part.add_argument("--quick", action="store_true", help="5 by 5 cells")
     args = parser.parse_args()
-    wp.config.log_level = wp.LOG_WARNING
     if args.part == "map":
         return maps.draw(args.names or list(SWEEPS), args.quick, args.out)
     print(f"response {args.response}\n{TABLE.head()}")

@@ -1,7 +1,10 @@
-"""The figures of one case, by name; what they are: ``tools/bench.py``."""
+"""The figures of one case, and of a start, by name; what they are: ``tools/bench.py``."""
 
+import os
 import resource
+import subprocess
 import sys
+import tempfile
 from statistics import median
 from time import perf_counter
 from unittest import mock
@@ -13,6 +16,16 @@ import warp_contact as wc
 from clock.scenes import Case
 from clock.window import Timing, measure
 
+START = """
+from time import perf_counter
+begin = perf_counter()
+import warp_contact as wc
+imported = perf_counter()
+from warp_contact.scenes import squeezed_sphere
+wc.Simulation(squeezed_sphere.build(), device={!r}).step_frame()
+print(imported - begin, perf_counter() - imported)
+"""
+STARTS = 3  # with kernels that are compiled already
 SHOWN_FRAMES = 3  # of which the median gives the frames per second
 BOUND = 90.0, 150.0, 1000.0  # ns that a tet, a surface vertex, a contact with its sweeps may take
 
@@ -96,6 +109,30 @@ def frame_times(sim: wc.Simulation, frames: int) -> list[float]:
         wp.synchronize_device(sim.device)
         times.append(perf_counter() - start)
     return times
+
+
+def start_times(device: str | None, cold: bool) -> dict[str, float]:
+    """Seconds of the import, and from there to the end of the first frame.
+
+    ``cold_frame_s`` compiles all kernels, ``warm_frame_s`` finds them compiled.
+    """
+    found = {}
+    with tempfile.TemporaryDirectory() as cache:
+        environment = os.environ | ({"WARP_CACHE_PATH": cache} if cold else {})
+        if cold:
+            found["cold_frame_s"] = _start(device, environment)[1]
+        runs = [_start(device, environment) for _ in range(STARTS)]
+    imports, frames = zip(*runs, strict=True)
+    return {"import_s": median(imports), "warm_frame_s": median(frames), **found}
+
+
+def _start(device: str | None, environment: dict[str, str]) -> list[float]:
+    """One start, in a process of its own."""
+    command = [sys.executable, "-c", START.format(device)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"the start failed: {done.stderr.strip()}")
+    return [float(seconds) for seconds in done.stdout.splitlines()[-1].split()]
 
 
 def log_slope(x, y) -> float:

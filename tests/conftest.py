@@ -156,17 +156,17 @@ def stages():
 
 def _find_contacts(model, work, x0, x=None, edges=False, apart=False) -> SimpleNamespace:
     from warp_contact.data.launch import if_any
-    from warp_contact.step import broad_phase, impulse, look, narrow_phase
+    from warp_contact.step import broad_phase, detection, impulse, narrow_phase
 
     x = x0 if x is None else x
     broad_phase.refresh(model, x0, x, work)
     if edges:
-        (look.look_apart if apart else look.look)(model, x0, x, work)
+        (detection.detect_apart if apart else detection.detect)(model, x0, x, work)
     elif apart:
         narrow_phase.find_entered_vertices(model, x0, x, work)
         if_any(work.contacts.n, impulse.begin, model, x0, work)
     else:
-        look.look_at_vertices(model, x0, x, work)
+        detection.detect_vertices(model, x0, x, work)
     assert not work.overflow.all.numpy().any()
     return _records(work)
 

@@ -24,16 +24,16 @@ OWNERS = constraint, edge_contact, search, step_bounds, stepper, tangent, vertex
 
 @pytest.fixture
 def part():
-    """A part of which a figure depends on ``search.BOUND``: ``part(with, without, least)``."""
+    """A part of which a figure depends on a bound: ``part(with, without, least)``."""
 
     def make(kept: float, off: float, least: float = 0.0) -> Part:
-        bound = search.BOUND
+        bound = search.SEARCH_BOUND
 
         def case() -> dict[str, float]:
             """A number."""
-            return {"figure": kept if search.BOUND == bound else off}
+            return {"figure": kept if search.SEARCH_BOUND == bound else off}
 
-        return Part("name", number(search, "BOUND", 1.0), case, "figure", least)
+        return Part("name", number(search, "SEARCH_BOUND", 1.0), case, "figure", least)
 
     return make
 
@@ -61,7 +61,7 @@ def test_a_run_that_stops_early_is_worse_than_any(part):
     with mock.patch.object(ablation, "figures", lambda case: {"figure": 1.0}):
         stops = Part(
             "name",
-            number(search, "BOUND", 1.0),
+            number(search, "SEARCH_BOUND", 1.0),
             mock.Mock(side_effect=SimulationError("not finite")),
             "figure",
             0.0,

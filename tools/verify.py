@@ -9,13 +9,12 @@ is 1 when one is missed. No time is measured.
 
 import argparse
 import sys
-from collections.abc import Iterator
 from functools import partial
 from importlib import import_module
 
 import warp as wp
 from measure import machine, report
-from measure.figure import Figure, lowest
+from measure.figure import Figures, lowest
 from measure.run import one_of, run, status
 from verification.setup import RESPONSES, Ask
 
@@ -65,7 +64,7 @@ def main() -> int:
     return status(found)
 
 
-def figures(where: str, ask: Ask) -> Iterator[Figure]:
+def figures(where: str, ask: Ask) -> Figures:
     """Those of a case; only the files of cases that are asked for are imported."""
     file, function = where.split(".")
     return getattr(import_module(f"verification.{file}"), function)(ask)

@@ -5,7 +5,7 @@
     dP  = 2 mu (dF - dR) + lam (cof F : dF) cof F + lam (J - 1) dcof F
     dR  = R [w]x,  (tr S I - S) w = axl(R^T dF),  S = sym(R^T F)
 
-F = R S is the polar decomposition with det R = +1 even for an inverted tet, whose S then has
+F = R S is the polar decomposition, with det R = +1 even for an inverted tet, whose S then has
 one negative eigenvalue. mu, lam are the Lame parameters [Pa], beta the damping time [s] of the
 viscous stress in ``tet.viscous_stress``. For a Poisson ratio of 0 a bar stretched by s carries
 P = E (s - 1). R comes from the closed form of Markley, which maximises tr(R^T F) over the
@@ -14,8 +14,8 @@ rotations:
     R = ((k + |F|^2) F + y cof F - F F^T F) / z,  k = (y^2 - |F|^2)/2,  z = k y - J
     y   largest root of y^4 - 2 |F|^2 y^2 - 8 J y + |F|^4 - 4 |cof F|^2
 
-z = (s1 + s2)(s2 + s3)(s3 + s1) with the signed singular values s. Where it vanishes R jumps
-(collapsed to a line, or mirrored), and a singular value decomposition picks one of the maximisers.
+z = (s1 + s2)(s2 + s3)(s3 + s1) with the signed singular values s. Where z vanishes (a tet collapsed
+to a line, or mirrored), R jumps. There a singular value decomposition picks one of the maximisers.
 
 Sources: Stomakhin et al. 2012, "Energetically consistent invertible elasticity";
 Markley 1993, "Attitude determination using vector observations: a fast optimal matrix algorithm".
@@ -31,7 +31,7 @@ wp.set_module_options(ARITHMETIC)
 
 __all__ = ["ROW", "apply_damping", "apply_stiffness", "energies", "set_forces"]
 
-NEWTON = wp.constant(8)  # most steps from sqrt(3) |F|, which is above the root and exact at rest
+NEWTON = wp.constant(8)  # steps at most, from sqrt(3) |F|: above the root, and exact at rest
 ROUNDING = wp.constant(1.0e-6)  # of the quartic in y, relative to |F|^4
 DEGENERATE = wp.constant(1.0e-2)  # z / |F|^3 below which float32 loses the closed form
 
@@ -47,7 +47,7 @@ def rotation(f: wp.mat33) -> wp.mat33:
     for _ in range(NEWTON):
         p = ((y * y - 2.0 * n2) * y - 8.0 * j) * y + n4
         slope = (4.0 * y * y - 4.0 * n2) * y - 8.0 * j
-        if p <= ROUNDING * n2 * n2 or slope <= 0.0:  # from above: p falls to its rounding error
+        if p <= ROUNDING * n2 * n2 or slope <= 0.0:  # from above, down to the rounding error of p
             break
         y -= p / slope
     k = 0.5 * (y * y - n2)
@@ -68,7 +68,7 @@ def rotation_differential(f: wp.mat33, r: wp.mat33, df: wp.mat33) -> wp.mat33:
     c = element.cof(m)
     z = wp.dot(element.column(m, 0), element.column(c, 0))
     n2 = wp.ddot(f, f)
-    # R has no differential where z = 0: the floor keeps its growth next to the jump finite.
+    # R has no differential where z = 0. The floor keeps dR finite next to the jump.
     z = wp.max(z, DEGENERATE * n2 * wp.sqrt(n2) + 1.0e-30)
     w = c * wp.vec3(b[2, 1] - b[1, 2], b[0, 2] - b[2, 0], b[1, 0] - b[0, 1]) / z
     return r * wp.skew(w)

@@ -1,4 +1,4 @@
-"""capacity.py: buffers that a frame outgrew, and those that it would soon have outgrown."""
+"""capacity.py: buffers that a frame outgrew, or would soon have outgrown; nothing is lost."""
 
 from dataclasses import astuple, fields, replace
 

@@ -54,7 +54,7 @@ def test_impulses_keep_the_momentum(rng, stages, find_contacts, records, jittere
     assert (c.normal_impulse > 0.0).sum() > 10
     # Each of up to 48 sweeps rounds every velocity of up to 5 m/s; heavy ones hardly change.
     assert linear < 1e-5
-    # Overlaps this deep are further than a couple reaches: only without friction.
+    # Overlaps this deep are further than a torque reaches: only without friction.
     assert friction > 0.0 or angular < 1e-5
 
 
@@ -66,13 +66,13 @@ def test_friction_across_a_gap_keeps_the_angular_momentum(
     model, x0, v0, v1, c = exchanged(scene, stages, find_contacts, records)
     used = c.normal_impulse > 0.0
     assert used.sum() > 10 and (c.gap[used] > 1e-3).mean() > 0.5
-    couples = (c.gap * np.linalg.norm(c.friction_impulse, axis=1)).sum()
-    # A triangle that is too thin for its gap takes no couple: friction then turns the pair.
+    torques = (c.gap * np.linalg.norm(c.friction_impulse, axis=1)).sum()
+    # A triangle that is too thin for its gap takes no torque: friction then turns the pair.
     untaken = np.linalg.norm(c.friction_impulse, axis=1)[c.gap == 0.0].sum() * 0.03
     linear, angular = momentum_changes(model, x0, v0, v1)
     passed = np.abs(model.mass.numpy()[:, None] * (v1 - v0)).sum()
-    print(f"couples of the friction {couples / passed:.1e} m")
-    assert couples > 1e-4 * passed
+    print(f"torques of the friction {torques / passed:.1e} m")
+    assert torques > 1e-4 * passed
     # As above, of velocities of 50 m/s that change by a part; weights on cells of 1/3 m round.
     assert linear < 1e-5 and angular < 1e-5 + untaken / passed
 
@@ -93,8 +93,8 @@ def test_impulses_never_add_kinetic_energy(
     assert after <= (1.0 + 1e-5) * before
 
 
-def test_the_couple_of_friction_adds_no_energy_to_a_light_corner(stages, find_contacts, records):
-    # Heavy corners above fixed ones of a light face: its free corner takes little but the couple.
+def test_the_torque_of_friction_adds_no_energy_to_a_light_corner(stages, find_contacts, records):
+    # Heavy corners above fixed ones of a light face: its free corner takes little but the torque.
     scene = Scene(gravity=(0.0, 0.0, 0.0), friction=5.0)
     scene.add_body(box(1.0, 1), NeoHookean(1e5, 0.3, 1.0), fixed=np.arange(8) != 5)
     place, v = (-0.34, -0.34, 0.69), (5.0, 5.0, -60.0)
@@ -157,7 +157,7 @@ def test_no_contact_approaches_further_than_its_gap(rng, stages, find_contacts, 
     print(f"worst {too_far.max():.1e} of an edge")
     # The sweeps end at their tolerance, or after 48 with some clusters of contacts to go: 3.4e-5 is
     # the worst of 30 draws.
-    assert np.median(too_far) < impulse.TOLERANCE and too_far.max() < 1e-3
+    assert np.median(too_far) < impulse.IMPULSE_TOLERANCE and too_far.max() < 1e-3
 
 
 def test_fixed_vertices_keep_their_velocity(rng, stages, find_contacts, records, jittered):
@@ -232,4 +232,4 @@ def test_contacts_are_left_alone_only_when_they_are_done(
     print(f"{n} contacts, alone {alone}, approach {approach / edge:.1e}")
     assert work.sweeps.number.numpy()[0] <= impulse.SWEEPS and max(alone[2:]) > n // 8
     # The last sweep, of all contacts at once, moves the vertices that they share once more.
-    assert approach < 5.0 * impulse.TOLERANCE * edge
+    assert approach < 5.0 * impulse.IMPULSE_TOLERANCE * edge

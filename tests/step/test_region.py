@@ -3,7 +3,7 @@
 import numpy as np
 
 from warp_contact import NeoHookean, Scene, box
-from warp_contact.kernels.surface.residual import TOLERANCE
+from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
 from warp_contact.step import residual, search
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -59,7 +59,7 @@ def test_overlap_left_is_the_gap_of_the_records(rng, stages, find_contacts, reco
     gap = np.einsum("ck,cki,ci->c", c.coef, x[c.vert], c.normal) - c.offset
     used = (c.coef != 0.0).any(axis=1)
     assert (c.pair[used, 1] == model.n_body).any()
-    least = TOLERANCE * model.body_edge.numpy()[c.pair[:, 0]]
+    least = CLOSURE_TOLERANCE * model.body_edge.numpy()[c.pair[:, 0]]
     # Coordinates of order 1 in float32.
     counted, too_small = used & (-gap > least + 1e-6), used & (-gap < least - 1e-6)
     np.testing.assert_allclose(c.residual[counted], -gap[counted], atol=1e-6)

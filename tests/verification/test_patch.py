@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 from verification import patch
-from verification.setup import Pose
-
-import warp_contact as wc
+from verification.setup import Ask, Pose
 
 
 def test_the_start_is_the_exact_solution():
     pile = patch.pair((3, 2), False, Pose(True))
-    sim = pile.start(wc.Simulation(pile.build()), patch.EXACT)
+    sim = pile.simulate(Ask(), patch.EXACT)
     # Positions of order 1 in float32 against a strain of 0.01.
     np.testing.assert_allclose(pile.pressures(sim, *sim.scene.bodies), 1e4, rtol=1e-3)
     ends = [pile.face(sim, 0, 1).mean(), pile.face(sim, 1, -1).mean()]

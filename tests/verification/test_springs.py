@@ -18,13 +18,12 @@ def test_the_closed_form_meets_published_numbers():
 @pytest.mark.parametrize(("across", "mesh", "turned"), VARIANTS)
 @pytest.mark.parametrize("name", springs.CASES)
 def test_columns_share_their_overlap_like_springs(name, across, mesh, turned, ask, hold):
-    figures = springs.press(name, springs.CASES[name], ask, across, mesh, Pose(turned))
+    figures = springs.press(name, ask, across, mesh, Pose(turned))
     hold(figures, "excellent")
 
 
 def test_the_pressure_does_not_depend_on_the_damping_of_the_material(ask, hold):
-    case = springs.CASES["equal"]
-    figures = list(springs.press("equal", case, ask, 6, "structured", Pose(), springs.DAMPED))
+    figures = list(springs.press("equal", ask, 6, "structured", Pose(), springs.DAMPED))
     hold(figures, "excellent")
 
 
@@ -35,8 +34,7 @@ def test_a_stack_of_cubes_carries_the_weight_above_each(cells, ask, hold):
 
 def test_a_penalty_of_a_hundred_times_the_columns_presses_about_as_much():
     """What the exact answer is compared with is in series with the penalty: p / (1 + 1 / 100)."""
-    case = springs.CASES["equal"]
-    found = springs.press("equal", case, Ask(response="penalty"), 4, "structured", Pose())
+    found = springs.press("equal", Ask(response="penalty"), 4, "structured", Pose())
     force = next(f for f in found if "force" in f.name)
     print(force)
     # It takes effect for the contacts that are found. At flush rims rounding decides: without them

@@ -10,7 +10,7 @@ What holds nothing is ``missed``.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,6 +61,9 @@ class Figure:
             return OK if self.value is not None and low <= self.value <= high else MISSED
         held = sum(self.error is not None and abs(self.error) <= most for most in self.limits)
         return (MISSED, *(LEVELS if len(self.limits) > 1 else (OK,)))[held]
+
+
+Figures = Iterator[Figure]
 
 
 def relative(case: str, name: str, value: float, exact: float, limits=()) -> Figure:

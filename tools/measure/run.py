@@ -1,12 +1,12 @@
 """Run named cases, print their figures as they come, and say how it went."""
 
 import argparse
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 import warp as wp
 
 from measure import report
-from measure.figure import MISSED, Figure, lowest
+from measure.figure import MISSED, Figure, Figures, lowest
 from warp_contact import SimulationError
 
 Case = Callable[[], Iterable[Figure]]
@@ -26,7 +26,7 @@ def run(cases: Mapping[str, Case]) -> dict[str, list[Figure]]:
     return found
 
 
-def guarded(name: str, case: Case) -> Iterator[Figure]:
+def guarded(name: str, case: Case) -> Figures:
     """The figures of a case, the last of them the error that ended it, if any."""
     try:
         yield from case()

@@ -8,8 +8,8 @@ from parts import apart, impacts, loads
 from parts.off import constant, number, switch
 from warp_contact.frame import step_bounds, stepper
 from warp_contact.kernels.impulse import constraint, tangent
+from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
 from warp_contact.kernels.narrow_phase import edge_contact, edges, vertex_contact
-from warp_contact.kernels.surface.residual import TOLERANCE
 from warp_contact.step import search
 
 
@@ -32,7 +32,7 @@ class Part:
     least: float
 
 
-FINEST = 100.0 * float(TOLERANCE)  # % of an edge: an overlap that is left on purpose
+FINEST = 100.0 * float(CLOSURE_TOLERANCE)  # % of an edge: an overlap that is left on purpose
 GAIN = 1e-3  # of the energy: what a pile of roundings and closures may add
 ROUNDED = 1e-6  # of the angular momentum: a walk of float32 over a thousand steps
 
@@ -57,7 +57,7 @@ _without = {
     "ramp": constant(tangent, "UPRIGHT", 2.0, constraint),
     "entry": constant(vertex_contact, "ASTRAY", 0.0),
     "deep end": constant(edge_contact, "ASIDE", 0.0, edges),
-    "bound": number(search, "BOUND", math.inf),
+    "bound": number(search, "SEARCH_BOUND", math.inf),
     "deep": number(step_bounds, "LINGERING", step_bounds.TRAVEL),
     "thin": number(step_bounds, "REACH", math.inf),
     "repeats": number(step_bounds, "UNSTABLE", math.inf),

@@ -14,11 +14,10 @@ the lumped mesh on the way. The same in exact contact on the same mesh, shown be
 of the error is due to the contact; four times as many elements leave a part of it.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from measure.figure import Figure, relative, rms, zero
+from measure.figure import Figure, Figures, relative, rms, zero
 
 import warp_contact as wc
 from verification import chain
@@ -104,7 +103,7 @@ ELEMENTS = 40  # along a bar of length L1
 UNEQUAL, FINE, FASTER = ("L2 = 2 L1", "E2 = 16 E1"), 160, 5
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Every impact; the full run adds coarser and finer bars, and cells that differ."""
     for name, impact in IMPACTS.items():
         yield from hit(f"A4 {name}, N = {ELEMENTS}", impact, ask, ELEMENTS)
@@ -199,9 +198,7 @@ def release(found: History, impact: Impact) -> float:
     return float(found.time[on[-1]] - (1.0 - part) * impact.frame)
 
 
-def hit(
-    label: str, impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)
-) -> Iterator[Figure]:
+def hit(label: str, impact: Impact, ask: Ask, n: int, across=(1, 1)) -> Figures:
     """Restitution, pressure, release and energies of an impact."""
     found, round_trip = record(impact, ask, n, across), impact.bars[0].round_trip
     yield relative(label, "restitution", found.e, impact.e, RESTITUTION)

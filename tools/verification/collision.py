@@ -6,11 +6,10 @@ a corner. Thrown blocks have unequal densities, meet obliquely and spinning, wit
 and are followed over a thousand steps. The scales are sum m |v| and sum m |x| |v| at the start.
 """
 
-from collections.abc import Iterator, Sequence
 from itertools import product
 
 import numpy as np
-from measure.figure import Figure, zero
+from measure.figure import Figure, Figures, zero
 
 import warp_contact as wc
 from verification.setup import ALIGNED, ANGLES, Ask, masses, quaternion
@@ -48,7 +47,7 @@ NAMES = (
 )
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Every placement, the worst of them, then thrown blocks; quick leaves out the fine ones."""
     quick = [c for c in CELLS if c != (8, 8)], RATIOS[:1]
     worst = np.zeros(len(NAMES))
@@ -62,13 +61,13 @@ def run(ask: Ask) -> Iterator[Figure]:
         yield from hit(ask, (3, 5) if ask.quick else (5, 9), way, ratio)
 
 
-def hit(ask: Ask, cells: tuple[int, int], way: str, ratio: float) -> Iterator[Figure]:
+def hit(ask: Ask, cells: tuple[int, int], way: str, ratio: float) -> Figures:
     """Thrown blocks."""
     found = collide(thrown(cells, way, ratio), ask.respond(STIFFNESS), STEPS)
     yield from judged(f"A6 {way} {cells[0]}:{cells[1]} density 1:{ratio:g}", found, MOMENTUM)
 
 
-def judged(label: str, found: dict[str, float], angular: tuple) -> Iterator[Figure]:
+def judged(label: str, found: dict[str, float], angular: tuple) -> Figures:
     """The figures of a collision against their limits."""
     momentum, turning, energy, overlap = found.items()
     yield zero(label, *momentum, MOMENTUM)
@@ -111,13 +110,7 @@ def motion(sim: wc.Simulation) -> tuple[np.ndarray, np.ndarray, float, float]:
 
 
 def build(
-    a: int,
-    b: int,
-    ratio: float,
-    place: str,
-    friction: float = 0.0,
-    angles: Sequence[float] = ANGLES,
-    shift: np.ndarray = SHIFT,
+    a: int, b: int, ratio: float, place: str, friction=0.0, angles=ANGLES, shift=SHIFT
 ) -> wc.Scene:
     """Blocks of a and b cells along an edge, the second ``ratio`` times as stiff."""
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=friction)

@@ -73,14 +73,21 @@ class Pile:
             foot += c.length + self.gap
         return scene
 
-    def simulate(self, ask: Ask) -> wc.Simulation:
-        """A simulation in frames of about one step; a penalty has 100 E A / L in all."""
+    def simulate(self, ask: Ask, load: float | None = None) -> wc.Simulation:
+        """A simulation in frames of about one step; a penalty has 100 E A / L in all.
+
+        It starts at rest under a pressure ``load`` [Pa] on top, or in the rest shapes.
+        """
         first, height = self.columns[0], sum(c.length for c in self.columns)
         contacts = sum((c.cells[0] + 1) * (c.cells[1] + 1) for c in self.columns[:2])
         stiffness = 100.0 * first.young * first.section[0] * first.section[1] / height / contacts
         edge = min(min(c.section[0] / c.cells[0], c.length / c.cells[2]) for c in self.columns)
         rate = step_rate(edge, max(c.wave_speed for c in self.columns))
-        return wc.Simulation(self.build(), ask.respond(stiffness), fps=rate)
+        sim = wc.Simulation(self.build(), ask.respond(stiffness), fps=rate)
+        if load is not None:
+            x = np.concatenate(self.static(sim.scene, load))
+            sim.state.x.assign(x.astype(np.float32))
+        return sim
 
     def static(self, scene: wc.Scene, load: float = 0.0) -> list[np.ndarray]:
         """Positions [m] of each body under the weights and a pressure ``load`` [Pa] on top.
@@ -99,11 +106,6 @@ class Pile:
             sunk = (above * c.length + 0.5 * weight * c.length**2) / c.young
             foot += c.length - sunk + max(self.gap, 0.0)
         return positions
-
-    def start(self, sim: wc.Simulation, load: float = 0.0) -> wc.Simulation:
-        """Put a simulation into that state."""
-        sim.state.x.assign(np.concatenate(self.static(sim.scene, load)).astype(np.float32))
-        return sim
 
     def face(self, sim: wc.Simulation, k: int, side: int) -> np.ndarray:
         """Heights z [m] of the vertices at the lower (-1) or upper (1) end of column ``k``."""

@@ -3,12 +3,11 @@
 2 pi r / sqrt(1 - r^2)  for a ratio r of the damping to the critical one
 """
 
-from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
 import warp as wp
-from measure.figure import Figure, zero
+from measure.figure import Figure, Figures, zero
 
 import warp_contact as wc
 from verification.setup import Ask, masses, on_face, watch
@@ -28,7 +27,7 @@ MATERIALS = {
 NONE, OFF = (1e-3,), (5.0,)  # largest decrement without damping; % off with it
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Every material and damping; the quick run leaves two materials out."""
     for name, ratio in product(list(MATERIALS)[: 1 if ask.quick else None], RATIOS):
         yield decay(f"energy {name} damping ratio {ratio:g}", MATERIALS[name], ratio)

@@ -19,7 +19,7 @@ from unittest.mock import patch
 
 import numpy as np
 import warp as wp
-from measure.figure import Figure, relative, rms, zero
+from measure.figure import Figure, Figures, relative, rms, zero
 
 import warp_contact as wc
 from verification.setup import Ask, G, forces, masses, vertex_areas, watch
@@ -50,7 +50,7 @@ LIMITS = {
 }
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Both ratios on a fixed block; with and without weights on a deformable one, quick for one."""
     for ratio in RATIOS:
         yield from drag(ask, ratio, fixed=True)
@@ -97,7 +97,7 @@ def slide(ask: Ask, ratio: float, fixed: bool) -> tuple[float, dict[str, float]]
     return weight, {MEAN: mean} | dict(zip((*LIMITS, JUMP), np.array(felt) / weight, strict=True))
 
 
-def drag(ask: Ask, ratio: float, fixed: bool) -> Iterator[Figure]:
+def drag(ask: Ask, ratio: float, fixed: bool) -> Figures:
     """Ripples of both forces and of the height."""
     label = f"A9 facets 1:{ratio:g}, {'fixed' if fixed else 'deformable'} base"
     weight, felt = slide(ask, ratio, fixed)
@@ -107,7 +107,7 @@ def drag(ask: Ask, ratio: float, fixed: bool) -> Iterator[Figure]:
     yield Figure(label, JUMP, felt[JUMP])
 
 
-def compare(ask: Ask, ratio: float) -> Iterator[Figure]:
+def compare(ask: Ask, ratio: float) -> Figures:
     """On the deformable block with the weights, then without; the reference is with them."""
     on = list(drag(ask, ratio, fixed=False))
     yield from on

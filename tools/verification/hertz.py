@@ -14,10 +14,10 @@ with the ends free; its modulus is the E* of a ratio of 0.3, which is all that t
 They are those of rows of vertices along the line: force over the width of a row.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
-from measure.figure import Figure, relative, zero
+from measure.figure import Figure, Figures, relative, zero
 
 import warp_contact as wc
 from verification.relax import rest, step_rate
@@ -71,10 +71,11 @@ def line_contact(load: float, radius: float, e_star: float) -> tuple[float, floa
 
 
 CONTACT = contact_radius(LOADS[1], RADIUS, modulus(YOUNG))  # a that the meshes are made for [m]
+Pressed = tuple[wc.Simulation, np.ndarray]  # at rest, mean pressures of the vertices [Pa]
 E_STAR, ORIGIN = modulus(YOUNG), (0.0, 0.0, 0.0)  # [Pa], [m]
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """A sphere on a plane, the exponent of F(d), then pairs, quick one of them."""
     yield from planes(ask, on_plane)
     yield from exponent(ask, 2)
@@ -82,12 +83,12 @@ def run(ask: Ask) -> Iterator[Figure]:
         yield from on_sphere(ask, name, 2)
 
 
-def cylinder(ask: Ask) -> Iterator[Figure]:
+def cylinder(ask: Ask) -> Figures:
     """A cylinder on a plane."""
     return planes(ask, line_on_plane)
 
 
-def planes(ask: Ask, on_plane: Callable) -> Iterator[Figure]:
+def planes(ask: Ask, on_plane: Callable) -> Figures:
     """1, 2 and 4 elements across; quick leaves 4 and the turned ones out."""
     for n in COUNTS[: 2 if ask.quick else None]:
         for turned in (False,) if ask.quick else (False, True):
@@ -122,10 +123,8 @@ def pressure_wave(young: float, poisson: float = POISSON) -> float:
     return float(np.sqrt(stiff / DENSITY))
 
 
-def squeeze(
-    ask: Ask, bodies: list[tuple], size: float, depth: float | None = None, pose: Pose = ALIGNED
-) -> tuple[wc.Simulation, np.ndarray]:
-    """Bodies held at their planes above, at rest, and mean pressures of their vertices [Pa].
+def squeeze(ask: Ask, bodies: list[tuple], size: float, depth=None, pose=ALIGNED) -> Pressed:
+    """Let bodies come to rest that are held at their planes above.
 
     Each is a mesh with elements of ``size`` [m], a material, its place and rotation; with a depth
     [m] there is a plane below.
@@ -144,37 +143,30 @@ def squeeze(
     return sim, p.mean(axis=0)
 
 
-def press(
-    ask: Ask, n: float, depth: float, pose: Pose, rings: int | None = None
-) -> tuple[wc.Simulation, np.ndarray]:
+def press(ask: Ask, n: float, depth: float, pose: Pose, rings: int | None = None) -> Pressed:
     """Press a sphere onto a plane by ``depth`` [m]."""
     ball = cap(RADIUS, CONTACT / n, rings or RINGS[n]), wc.Corotated(YOUNG, POISSON, DENSITY)
     return squeeze(ask, [(*ball, ORIGIN, pose.q)], CONTACT / n, depth, pose)
 
 
-def on_plane(ask: Ask, n: int, pose: Pose) -> Iterator[Figure]:
+def on_plane(ask: Ask, n: int, pose: Pose) -> Figures:
     """Force, radius, peak and profile of the pressure."""
-    sim, p = press(ask, n, CONTACT**2 / RADIUS, pose)
+    pressed = press(ask, n, CONTACT**2 / RADIUS, pose)
     label = f"A3 sphere on plane, N = {n} {pose}"
-    yield from below(label, sim, p, RADIUS, modulus(YOUNG), n, pose)
+    yield from below(label, pressed, (ball_contact, RADIUS, E_STAR), n, pose)
 
 
-def below(
-    label: str, sim: wc.Simulation, p: np.ndarray, radius: float, e_star: float, n: int, pose: Pose
-) -> Iterator[Figure]:
+def below(label: str, pressed: Pressed, exact: tuple, n: int, pose: Pose) -> Figures:
     """The pressures below the first sphere, at the vertices of its lower side."""
+    sim, p = pressed
     body = sim.scene.bodies[0]
     under = np.flatnonzero(on_ball(body))
     r = np.linalg.norm(pose.back(sim.positions(body)[under])[:, :2], axis=1)
     found = r, p[under], vertex_areas(sim)[under]
-    yield from profile(
-        label, ("force [N]", "radius"), found, (ball_contact, radius, e_star), 2.5, n
-    )
+    yield from profile(label, ("force [N]", "radius"), found, exact, 2.5, n)
 
 
-def profile(
-    label: str, names: tuple[str, str], found: tuple, exact: tuple, moment: float, n: int
-) -> Iterator[Figure]:
+def profile(label: str, names: tuple, found: tuple, exact: tuple, moment: float, n: int) -> Figures:
     """Pressures against p0 sqrt(1 - r^2 / a^2) at the same force, with n elements across a.
 
     ``names`` are those of the force and of a. What was found are places r [m], pressures there [Pa]
@@ -208,7 +200,7 @@ def on_ball(body) -> np.ndarray:
     return np.abs(z + np.sqrt(RADIUS**2 - x**2 - y**2) - RADIUS) < 1e-9
 
 
-def exponent(ask: Ask, n: int) -> Iterator[Figure]:
+def exponent(ask: Ask, n: int) -> Figures:
     """Slope of log F over log d; the held plane adds a part linear in F to d."""
     depths = [contact_radius(f, RADIUS, modulus(YOUNG)) ** 2 / RADIUS for f in LOADS]
     loads = [sum(press(ask, n, d, ALIGNED)[0].measure().forces.values()) for d in depths]
@@ -217,7 +209,7 @@ def exponent(ask: Ask, n: int) -> Iterator[Figure]:
     yield Figure(label, "exponent of F(d)", slope, 1.5, slope - 1.5, SLOPE)
 
 
-def on_sphere(ask: Ask, name: str, n: int) -> Iterator[Figure]:
+def on_sphere(ask: Ask, name: str, n: int) -> Figures:
     """Two caps, the upper one first, on meshes that do not match."""
     radii, youngs, load = PAIRS[name]
     e_star, radius = modulus(*youngs), 1.0 / sum(1.0 / r for r in radii)
@@ -230,8 +222,8 @@ def on_sphere(ask: Ask, name: str, n: int) -> Iterator[Figure]:
         material = wc.Corotated(young, POISSON, DENSITY * young / YOUNG)
         place = (0.0, 0.0, k * a**2 / radius)
         bodies.append((cap(own, a / n, RINGS[n]), material, place, turns[k]))
-    sim, p = squeeze(ask, bodies, a / n)
-    yield from below(f"A3 {name}, N = {n}", sim, p, radius, e_star, n, ALIGNED)
+    pressed = squeeze(ask, bodies, a / n)
+    yield from below(f"A3 {name}, N = {n}", pressed, (ball_contact, radius, e_star), n, ALIGNED)
 
 
 def slab(size: float, columns: int) -> wc.TetMesh:
@@ -244,7 +236,7 @@ def slab(size: float, columns: int) -> wc.TetMesh:
     return wc.TetMesh(np.stack([x, y, z], axis=1), box.tets)
 
 
-def line_on_plane(ask: Ask, n: int, pose: Pose) -> Iterator[Figure]:
+def line_on_plane(ask: Ask, n: int, pose: Pose) -> Figures:
     """Force, half-width, peak and profile of the pressure."""
     b, _ = line_contact(LINE_LOAD, RADIUS, E_STAR)
     # About the force asked for (Johnson 1985, sec. 5.6, nu = 0).

@@ -12,11 +12,10 @@ Those of Hertz are the orders of linear and quadratic elements against a curved 
 for the pressure.
 """
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from measure.figure import Figure
+from measure.figure import Figure, Figures
 
 import warp_contact as wc
 from verification import bars, friction, hertz
@@ -42,7 +41,7 @@ DIP, WAIT = 0.3, 10  # start, of the weight; until [frames]: L / c, a quarter of
 RINGS = 4, 8, 16  # of nested meshes, 1, 2 and 4 elements across the contact
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Impact, sliding, resting, Hertz; the quick run leaves out what is finest."""
     last = -1 if ask.quick else None
     yield from impact(ask, ELEMENTS[:last])
@@ -62,7 +61,7 @@ def order(label: str, name: str, sizes, errors, target: tuple[float, tuple]) -> 
     return Figure(label, name, slope, ideal, missing, limits)
 
 
-def impact(ask: Ask, counts) -> Iterator[Figure]:
+def impact(ask: Ask, counts) -> Figures:
     """Restitution and energy of a bar on a wall; the step follows the elements."""
     found = [bars.record(bars.IMPACTS["on a wall"], ask, n) for n in counts]
     label = f"A8 bar on a wall, N = {', '.join(map(str, counts))}"
@@ -88,7 +87,7 @@ def in_steps(label: str, name: str, start: tuple, x: np.ndarray, seconds: float,
     return order(label, name, 1.0 / np.array(SUBSTEPS[:-1]), errors, SMOOTH)
 
 
-def sliding(ask: Ask) -> Iterator[Figure]:
+def sliding(ask: Ask) -> Figures:
     """Place of a block on a slope, in motion from the start: letting go is not smooth."""
     scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
     x = friction.begin(ask, scene).positions()
@@ -97,7 +96,7 @@ def sliding(ask: Ask) -> Iterator[Figure]:
     yield in_steps("A8 sliding block", "order of the place in dt", start, x, SLIDES, place)
 
 
-def resting(ask: Ask) -> Iterator[Figure]:
+def resting(ask: Ask) -> Figures:
     """State of a bar that trembles about its settlement on a plane and never leaves it.
 
     It starts at rest with a part of its weight; velocities count by length over wave speed.
@@ -123,7 +122,7 @@ def standing(part: float) -> wc.Scene:
     return scene
 
 
-def pressure(ask: Ask, counts) -> Iterator[Figure]:
+def pressure(ask: Ask, counts) -> Figures:
     """L2 error of the pressure below a sphere and a cylinder."""
     for body, case in (("sphere", hertz.on_plane), ("cylinder", hertz.line_on_plane)):
         errors = []
@@ -134,7 +133,7 @@ def pressure(ask: Ask, counts) -> Iterator[Figure]:
         yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)
 
 
-def shape(ask: Ask, across: float) -> Iterator[Figure]:
+def shape(ask: Ask, across: float) -> Figures:
     """L2 norm of the displacement below a sphere; differences of successive, nested meshes.
 
     ``across`` elements are in the contact of the first.

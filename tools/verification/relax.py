@@ -27,13 +27,7 @@ def step_rate(edge: float, speed: float) -> float:
 
 
 def rest(
-    sim: wc.Simulation,
-    omega: float,
-    lasts: float,
-    of: Callable,
-    part: float = 0.2,
-    least: int = 0,
-    calmed: bool = True,
+    sim: wc.Simulation, omega: float, lasts: float, of: Callable, part=0.2, least=0, calmed=True
 ) -> np.ndarray:
     """Let a scene come to rest; what ``of()`` is after each of the last frames, shape (n, ...).
 

@@ -1,15 +1,13 @@
 """The scenes for two seconds with both responses; the bowl alone, with contact surfaces."""
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from measure.figure import Figure
+from measure.figure import Figure, Figures
 
 import warp_contact as wc
 from verification.setup import Ask, facing, height
 from warp_contact import SimulationError, scenes
-from warp_contact.scenes import bowl as dish
 from warp_contact.scenes import membrane_stack
 
 FPS = 60
@@ -17,10 +15,11 @@ DURATION, QUICK = 2.0, 0.5  # [s]
 TINY = 1e-6  # a volume ratio above which a tet is not inverted
 CLEAR = 1e-3  # of an edge: an overlap that counts as resolved
 DEEPEST = 1.0  # overlap that a contact surface may leave [% of an edge]
+UPWARD = 0.2  # of the z of a normal of length 1: the inside of a bowl, but not its rim
 TIMES = 0.0, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0  # of the energies that are shown [s]
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Every scene but the bowl."""
     frames = round((QUICK if ask.quick else DURATION) * FPS)
     for name in sorted(set(scenes.names()) - {"bowl"}):
@@ -29,16 +28,14 @@ def run(ask: Ask) -> Iterator[Figure]:
             yield from play(name, module.build(), response, frames)
 
 
-def bowl(ask: Ask) -> Iterator[Figure]:
+def bowl(ask: Ask) -> Figures:
     """The bowl of fruit in 64 steps a frame: long on a CPU."""
     settings, duration = ({"fraction": 0.2}, 0.25) if ask.quick else ({}, DURATION)
     scene = scenes.load("bowl").build(**settings)
     return play("bowl", scene, wc.ContactSurface(), round(duration * FPS), 64)
 
 
-def play(
-    name: str, scene: wc.Scene, response, frames: int, substeps: int | None = None
-) -> Iterator[Figure]:
+def play(name: str, scene: wc.Scene, response, frames: int, substeps=None) -> Figures:
     """Run a scene: what counts for every one, then what its picture shows."""
     sim = wc.Simulation(scene, response, fps=FPS, substeps=substeps)
     measured, error = [sim.measure()], ""
@@ -53,7 +50,7 @@ def play(
     least = TINY if strict else None
     yield Figure(case, f"smallest volume ratio at {end}", ratios[-1], least=least)
     yield Figure(case, "smallest volume ratio ever", min(ratios))
-    lost = FALLEN[name](sim) if name in FALLEN else not_rising(sim, STACKS[name])
+    lost = fallen(name, sim)
     most = 0.0 if strict else None
     yield Figure(case, "bodies fallen through", len(lost), most=most, note=", ".join(lost))
     yield from overlaps(case, sim, measured, strict)
@@ -63,9 +60,7 @@ def play(
         yield Figure(case, figure, value)
 
 
-def overlaps(
-    case: str, sim: wc.Simulation, measured: list[wc.Measure], strict: bool
-) -> Iterator[Figure]:
+def overlaps(case: str, sim: wc.Simulation, measured: list, strict: bool) -> Figures:
     """When an overlap at the start is resolved; the deepest one from then on, and the last."""
     overlap = [in_edges(sim, m) for m in measured]
     clear = next((k for k, depth in enumerate(overlap) if depth <= CLEAR), None)
@@ -89,55 +84,24 @@ def in_edges(sim: wc.Simulation, measured: wc.Measure) -> float:
     return measured.overlap / min((edge[label] for label in pair if label in edge), default=1.0)
 
 
-# Of each scene, the bodies whose centre is no longer above what carries them.
-
-STACKS = {  # named from below
-    "two_bodies": (("equal_lower", "equal_upper"), ("unequal_lower", "unequal_upper")),
-    "sampling": (
-        ("coarse_on_fine_slab", "coarse_on_fine_arch"),
-        ("fine_on_coarse_slab", "fine_on_coarse_arch"),
-    ),
-    "squeezed_sphere": (("lower_cube", "sphere", "upper_cube"),),
-    "membrane_stack": (tuple(f"membrane_{k}" for k in range(membrane_stack.COUNT)),),
+CARRIED = {  # who carries whom, by their order in the scene; elsewhere the first carries all others
+    "two_bodies": ((0, 1), (2, 3)),
+    "sampling": ((0, 1), (2, 3)),
+    "squeezed_sphere": ((0, 1), (1, 2)),
+    "membrane_stack": tuple(pairwise(range(membrane_stack.COUNT))),
 }
 
 
-def centres(sim: wc.Simulation) -> dict[str, np.ndarray]:
-    """Mean position of the vertices of each body [m]."""
-    return {body.label: sim.positions(body).mean(axis=0) for body in sim.scene.bodies}
-
-
-def not_rising(sim: wc.Simulation, stacks: tuple[tuple[str, ...], ...]) -> list[str]:
-    """The bodies whose centre is below a floor, or not above that of the one before in a stack."""
-    at = centres(sim)
-    floors = [(n, h) for n, h in sim.scene.planes if n[2] > 0.5]
-    low = [label for label in at if any(at[label] @ n < h for n, h in floors)]
-    pairs = (pair for stack in stacks for pair in pairwise(stack))
-    return low + [upper for lower, upper in pairs if not at[upper][2] > at[lower][2]]
-
-
-def through_membrane(sim: wc.Simulation) -> list[str]:
-    """Cubes whose centre is below the membrane at its place."""
-    sheet, *cubes = sim.scene.bodies
-    at = np.array([sim.positions(cube).mean(axis=0) for cube in cubes])
-    z = height(at, sim.positions(sheet), facing(sheet.x, sheet.mesh.surface, 1.0))
-    return [cube.label for cube, ok in zip(cubes, at[:, 2] > z, strict=True) if not ok]
-
-
-def out_of_dish(sim: wc.Simulation) -> list[str]:
-    """Fruits whose centre is outside the sphere of the dish below its rim, or below the floor."""
-    radius, depth, wall = (dish.DISH[key] for key in ("radius", "depth", "thickness"))
-    curve = 0.5 * (radius**2 + depth**2) / depth
-    hub = np.array([0.0, 0.0, wall + curve])
-    fallen = []
-    for label, x in centres(sim).items():
-        below_rim = np.hypot(*x[:2]) < radius and x[2] < depth
-        if label != "dish" and (x[2] < 0.0 or (below_rim and np.linalg.norm(x - hub) > curve)):
-            fallen.append(label)
-    return fallen
-
-
-FALLEN = {"cubes_on_membrane": through_membrane, "bowl": out_of_dish}
+def fallen(name: str, sim: wc.Simulation) -> list[str]:
+    """The bodies whose centre is below a floor, or below the surface that carries them."""
+    bodies, floors = sim.scene.bodies, [(n, h) for n, h in sim.scene.planes if n[2] > 0.5]
+    at = [sim.positions(body).mean(axis=0) for body in bodies]
+    lost = {k for k, x in enumerate(at) if any(x @ n < h for n, h in floors)}
+    for k, upper in CARRIED.get(name) or ((0, k) for k in range(1, len(bodies))):
+        top = facing(bodies[k].x, bodies[k].mesh.surface, 1.0, UPWARD)
+        if at[upper][2] < height(at[upper][None], sim.positions(k), top)[0]:
+            lost.add(upper)
+    return [bodies[k].label for k in sorted(lost)]
 
 
 # What the paper's pictures show.

@@ -119,11 +119,11 @@ def vertex_areas(sim: wc.Simulation) -> np.ndarray:
     return np.bincount(tris.ravel(), np.repeat(area, 3), minlength=len(x))
 
 
-def facing(x: np.ndarray, tris: np.ndarray, up: float) -> np.ndarray:
+def facing(x: np.ndarray, tris: np.ndarray, up: float, least: float = 0.9) -> np.ndarray:
     """The triangles whose normals are along z, up (1) or down (-1), shape (k, 3)."""
     a, b, c = np.moveaxis(x[tris], 1, 0)
     n = np.cross(b - a, c - a)
-    return tris[up * n[:, 2] > 0.9 * np.linalg.norm(n, axis=1)]
+    return tris[up * n[:, 2] > least * np.linalg.norm(n, axis=1)]
 
 
 def height(points: np.ndarray, x: np.ndarray, tris: np.ndarray, slack=1e-3) -> np.ndarray:

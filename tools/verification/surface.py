@@ -5,18 +5,17 @@ its cells, and the surface belongs at the part a = k_other / (k_own + k_other) o
 where the block's own surface was.
 """
 
-from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-from measure.figure import Figure, zero
+from measure.figure import Figure, Figures, zero
 
 import warp_contact as wc
 from verification.setup import Ask, facing, height
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import Work, allocate_work
 from warp_contact.step import broad_phase, residual, search, surface
-from warp_contact.step.look import look, look_at_vertices
+from warp_contact.step.detection import detect, detect_vertices
 from warp_contact.step.loop import step_of
 
 EDGE = 0.1  # of a block [m]
@@ -35,7 +34,7 @@ MATERIALS = {
 SEARCHES = "balanced", "literal"
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Every combination, whatever the response; the quick run takes one material."""
     materials = list(MATERIALS)[: 1 if ask.quick else None]
     for way, name, cells, ratio in product(SEARCHES, materials, CELLS, RATIOS):
@@ -60,7 +59,7 @@ def prepare(way: str, *block) -> tuple[wc.Simulation, Work]:
 
 def place(
     case: str, way: str, model, poisson: float, cells: tuple[int, int], ratio: float
-) -> Iterator[Figure]:
+) -> Figures:
     """Figures of one combination; those of the literal search are shown only."""
     block = model, poisson, cells, ratio
     sim, work = prepare(way, *block)
@@ -100,7 +99,7 @@ def settle(sim: wc.Simulation, work: Work) -> int:
     balanced = sim.response.search == "balanced"
     for call in range(CALLS):
         broad_phase.refresh(model, state.x, state.x, work)
-        (look if balanced else look_at_vertices)(model, state.x, state.x, work)
+        (detect if balanced else detect_vertices)(model, state.x, state.x, work)
         residual.find_gaps(model, state.x, work)
         if not work.surface.any_open.numpy()[0]:
             return call

@@ -9,10 +9,8 @@ one R times as dense, R from 1 to 10000: E = 20 R rho G L, 5 % of strain in it, 
 starts in the static state of a column, the wave speeds differ by sqrt(R).
 """
 
-from collections.abc import Iterator
-
 import numpy as np
-from measure.figure import Figure, relative, zero
+from measure.figure import Figure, Figures, relative, zero
 
 import warp_contact as wc
 from verification.columns import Column, Pile, between
@@ -52,7 +50,7 @@ RIPPLE = 0.05, 0.005, 1e-5
 CENTRE = 0.02, 0.001, 1e-5  # of an edge of the block: the moment balance, as sharp as the force
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """What carries the block, one after the other; the quick run takes the first two stacks."""
     for case, stack in list(STACKS.items())[: 2 if ask.quick else None]:
         yield from stacked(f"A7 {case}", stack, ask)
@@ -73,16 +71,14 @@ def settled(ask: Ask, scene: wc.Scene, penalty: tuple[float, float] = PENALTY) -
     return sim
 
 
-def steady(
-    label: str, name: str, mean: float, force: np.ndarray, weight: float
-) -> Iterator[Figure]:
+def steady(label: str, name: str, mean: float, force: np.ndarray, weight: float) -> Figures:
     """Mean and ripple of a force [N] that ought to be a weight."""
     yield relative(label, f"mean force{name} [N]", mean, weight, FORCE)
     ripple = np.std(force) / max(mean, 1e-9)
     yield zero(label, f"ripple of the force{name} [of the mean]", ripple, RIPPLE)
 
 
-def stacked(label: str, stack: tuple, ask: Ask) -> Iterator[Figure]:
+def stacked(label: str, stack: tuple, ask: Ask) -> Figures:
     """Let a stack come to rest, then watch the forces between all that touches."""
     lower, upper, ratio, rotation = stack
     scene = wc.Scene(gravity=(0.0, 0.0, -G))
@@ -108,7 +104,7 @@ def stacked(label: str, stack: tuple, ask: Ask) -> Iterator[Figure]:
     yield Figure(label, "kinetic energy at the end [J]", sim.measure().kinetic)
 
 
-def centre(label: str, ask: Ask) -> Iterator[Figure]:
+def centre(label: str, ask: Ask) -> Figures:
     """Moment balance about the centre of mass, from the pressure at the vertices."""
     scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=0.0)
     scene.add_plane((0.0, 0.0, 1.0), 0.0)
@@ -127,7 +123,7 @@ def centre(label: str, ask: Ask) -> Iterator[Figure]:
     yield relative(label, "sum of the nodal forces [N]", total, WEIGHT, FORCE)
 
 
-def on_sheet(label: str, ask: Ask) -> Iterator[Figure]:
+def on_sheet(label: str, ask: Ask) -> Figures:
     """The block on a membrane held at its rim."""
     scene = wc.Scene(gravity=(0.0, 0.0, -G))
     sheet = wc.box(SHEET, SHEET_CELLS)
@@ -140,7 +136,7 @@ def on_sheet(label: str, ask: Ask) -> Iterator[Figure]:
     yield from steady(label, "", force.mean(), force, WEIGHT)
 
 
-def on_points(label: str, ask: Ask) -> Iterator[Figure]:
+def on_points(label: str, ask: Ask) -> Figures:
     """The block on three tips."""
     scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=GRIP)
     angle = 2.0 * np.pi * np.arange(3) / 3.0
@@ -160,7 +156,7 @@ def on_points(label: str, ask: Ask) -> Iterator[Figure]:
         yield relative(label, f"mean force on tip {k} [N]", force, part[k] * WEIGHT, FORCE)
 
 
-def ladder(ask: Ask) -> Iterator[Figure]:
+def ladder(ask: Ask) -> Figures:
     """A light cube below a heavy one; the quick run leaves out every second ratio."""
     for ratio in MASSES[:: 2 if ask.quick else 1]:
         yield from carry(ask, ratio)
@@ -175,12 +171,12 @@ def cubes(ratio: float, young: float) -> Pile:
     return Pile(both, APART, -0.5 * EDGE, gravity=G, friction=0.3)
 
 
-def carry(ask: Ask, ratio: float) -> Iterator[Figure]:
+def carry(ask: Ask, ratio: float) -> Figures:
     """Mean and ripple of the force on the light cube's top, and the overlap there."""
     label = f"A7m heavy on light, mass ratio {ratio:g}"
     young = 20.0 * ratio * DENSITY * G * EDGE
     pile = cubes(ratio, young)
-    sim = pile.start(pile.simulate(ask))
+    sim = pile.simulate(ask, 0.0)
     omega = float(np.sqrt(young * EDGE / (ratio * DENSITY * EDGE**3)))
     force = rest(sim, omega, REST, lambda: between(sim), 0.5, LEAST)[:, 0]
     blocks = force[: len(force) // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)

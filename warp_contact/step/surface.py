@@ -9,12 +9,11 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.switches import on
 from warp_contact.data.work import Work
+from warp_contact.kernels.lengths import OLD_OVERLAP
 from warp_contact.kernels.surface import closure
-from warp_contact.kernels.surface.residual import DEEP
 from warp_contact.step import residual, search, sweeps
 from warp_contact.step.contact_graph import add_parts
-from warp_contact.step.look import look, look_apart
-from warp_contact.step.search import BOUND
+from warp_contact.step.detection import detect, detect_apart
 
 
 def close_gaps(model: Model, state: State, work: Work) -> None:
@@ -39,7 +38,7 @@ def close(model: Model, state: State, work: Work) -> None:
     Contacts that overlapped when the step began are left out. ``state.v`` changes only by what
     keeps the angular momentum.
     """
-    _close(model, state, work, float(DEEP) if on("old planes") else math.inf)
+    _close(model, state, work, OLD_OVERLAP if on("old planes") else math.inf)
 
 
 def close_all(model: Model, state: State, work: Work) -> None:
@@ -54,7 +53,7 @@ def _close_gaps(model: Model, state: State, work: Work) -> None:
     # Where vertices came to lie, their triangles may be others than before, and edges may cross
     # that the narrow phase could not see.
     if on("second look"):
-        look_apart(model, state.x, state.x, work)
+        detect_apart(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, close_all, model, state, work)
 
@@ -63,7 +62,7 @@ def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -
     if_any(work.surface.any_old, search.balance, model, state.x, work, iterations)
     close(model, state, work)
     if on("second look"):
-        look(model, state.x, state.x, work)
+        detect(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, close, model, state, work)
 
@@ -76,7 +75,7 @@ def _close(model: Model, state: State, work: Work, deep: float) -> None:
     launch_over(
         closure.begin_closure,
         work.capacity.contacts,
-        inputs=[BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
+        inputs=[search.SEARCH_BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
         outputs=[s.slack, s.push],
     )
     sweeps.repeat(work, _sweep, model, state.x, work)

@@ -66,11 +66,9 @@ class UsdWriter:
         self.animate_tets = animate_tets and tets
         self.start = self.end = None
         self.parts = parts(sim.model)
-        counts = [end - first for first, end in (part.verts for part in self.parts)]
-        self.base = np.repeat([part.color for part in self.parts], counts, axis=0)
+        self.base = np.concatenate([np.tile(p.color, (p.n_vert, 1)) for p in self.parts])
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
-        self.grows = self.scale == 0.0
-        self.layer = self._declare()
+        self.grows, self.layer = self.scale == 0.0, self._declare()
         if resume:
             self._reopen()
         else:

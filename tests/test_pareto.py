@@ -1,4 +1,4 @@
-"""tools/pareto.py: who dominates whom, the rail of failures, the distance of surfaces."""
+"""tools/pareto.py: who dominates whom, the rail of failures, errors of the paper's scenes."""
 
 import shutil
 from dataclasses import replace
@@ -178,46 +178,6 @@ def test_words_and_picture_keep_every_failure(tmp_path):
     on_rail = [line for line in ax.lines if list(line.get_ydata()) == [picture.RAIL]]
     assert len(on_rail) == 2
     pyplot.close(figure)
-
-
-def distance(xa, xb) -> float:
-    """Of two surfaces of one triangle each."""
-    from chart.distance import distance
-
-    tri = np.array([[0, 1, 2]])
-    return distance(np.array(xa), tri, np.array(xb), tri)
-
-
-FLAT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
-PAIRS = {  # second triangle, distance from FLAT
-    "a vertex above the inside": ([[0.2, 0.2, 0.3], [0.2, 1.0, 2.0], [1.0, 0.2, 2.0]], 0.3),
-    "a vertex beside an edge": ([[0.5, -0.4, 0.0], [0.5, -2.0, 1.0], [0.6, -2.0, -1.0]], 0.4),
-    "edges that pass each other": ([[0.5, -1.0, -0.9], [0.5, -1.0, 1.1], [0.5, -2.0, 0.0]], 1.0),
-    "a crossed one above": ([[0.5, -0.5, 0.2], [0.5, 0.5, 0.2], [0.5, 0.0, 2.0]], 0.2),
-    "parallel edges": ([[0.2, -0.3, 0.0], [0.8, -0.3, 0.0], [0.5, -1.0, 1.0]], 0.3),
-    "one that goes through": ([[0.2, 0.2, 0.3], [0.2, 0.2, -0.3], [0.9, 0.9, 0.3]], 0.0),
-    "one apart in its own plane": ([[3.0, 0.0, 0.0], [4.0, 0.0, 0.0], [3.0, 1.0, 0.0]], 2.0),
-}
-
-
-@pytest.mark.parametrize("case", PAIRS)
-def test_the_distance_of_two_triangles(case):
-    other, exact = PAIRS[case]
-    # Double precision on coordinates of order 1.
-    assert distance(FLAT, other) == pytest.approx(exact, abs=1e-14)
-    assert distance(other, FLAT) == pytest.approx(exact, abs=1e-14)
-
-
-def test_the_distance_of_triangles_is_that_of_their_points(rng):
-    weights = np.array([(i, j, 40 - i - j) for i in range(41) for j in range(41 - i)]) / 40.0
-    for _ in range(20):
-        a, b = rng.uniform(-1.0, 1.0, (2, 3, 3))
-        sampled = np.linalg.norm((weights @ a)[:, None] - weights @ b, axis=2).min()
-        exact = distance(a, b)
-        # Each of the two nearest points has one of the samples within a cell, an edge over 40; no
-        # edge is longer than the diagonal of the cube that they are drawn from.
-        assert exact <= sampled + 1e-14
-        assert exact >= sampled - 2.0 * np.sqrt(12.0) / 40.0
 
 
 def held(heights) -> tuple:

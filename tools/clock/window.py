@@ -121,7 +121,7 @@ class _Window:
         stepper = sim._stepper
         self._work, self._device = stepper.work, sim.device
         self._work.share.fill_(share_for(stepper.rates[1], stepper.dt))
-        self.step = step_of(sim.response, bool(stepper.search))
+        self.step = step_of(sim.response, bool(stepper.overlapping))
         stages = stages_for(stepper.rates[1], stepper.dt)
         self._arguments = sim.model, sim.state, self._work, stages
         self._work.overflow.all.zero_()

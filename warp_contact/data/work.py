@@ -29,7 +29,7 @@ class Work:
         capacity: of the lists
         overflow: what did not fit
         dt: the step [s], shape (1,)
-        share: of the stages of the damping [-], shape (1,)
+        share: weight of the damped velocity [-], shape (1,)
         steps: how many the frame still has, shape (1,)
         awake: what moves
         mesh: what the search for contacts reads of the model

@@ -184,6 +184,7 @@ def held(heights) -> tuple:
     """The squeezed sphere with its upper cube at so many edges over the sphere, frame by frame."""
     from chart import scenes
     from engines.task import Motion, Numbered
+    from verification.setup import mean_edge
 
     task, panels = scenes.scene("squeezed_sphere", True)
     scene = task.scene()
@@ -218,6 +219,7 @@ def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
     from chart import scenes
     from engines import ours
     from engines.settings import DEFAULT
+    from verification.setup import mean_edge
 
     task, (*_, panel) = scenes.scene("squeezed_sphere", True)
     motion = ours.run(task, DEFAULT, None, np.inf)

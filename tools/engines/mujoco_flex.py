@@ -65,10 +65,9 @@ class Engine:
 
 def xml(scene, job: dict, setting: dict, dt: float) -> str:
     """The model in MuJoCo's language."""
-    touch = (
-        f'solref="{setting["time_constant"] * dt:.9g} 1" condim="{3 if job["friction"] else 1}" '
-    )
-    touch += f'friction="{max(job["friction"], 1e-5):g} 0 0"'
+    mu = job["friction"]
+    touch = f'friction="{max(mu, 1e-5):g} 0 0" condim="{3 if mu else 1}" '
+    touch += f'solref="{setting["time_constant"] * dt:.9g} 1"'
     parts = [
         f'<geom type="plane" size="0 0 1" zaxis="{_row(n)}" pos="{_row(np.array(n) * h)}" {touch}/>'
         for *n, h in scene.planes.tolist()
@@ -88,7 +87,8 @@ def xml(scene, job: dict, setting: dict, dt: float) -> str:
             f'radius="{radius}" point="{_row(scene.rest[mine].ravel())}" '
             f'element="{" ".join(map(str, (scene.tets[scene.tet_body == k] - mine[0]).ravel()))}">'
             f'<elasticity young="{scene.young[k]}" poisson="{scene.poisson[k]}" '
-            f'damping="{scene.damping[k]}"/><contact selfcollide="none" {touch}/>{pin}</flexcomp></body>'
+            f'damping="{scene.damping[k]}"/><contact selfcollide="none" {touch}/>{pin}'
+            "</flexcomp></body>"
         )
     return (
         f'<mujoco><option timestep="{dt:.12g}" integrator="discrete" '

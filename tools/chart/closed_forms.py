@@ -59,7 +59,7 @@ def place(task: Task, motion: Motion) -> float:
     """How far the mean heights of both faces are off, the worse of the two [of the overlap]."""
     whole, _ = sound(task, motion)
     exact, worst = meeting(motion.law), 0.0
-    for k, (body, part) in enumerate(whole.with_parts(task.scene())):
+    for k, (body, part) in enumerate(zip(task.scene().bodies, whole.parts, strict=True)):
         z = motion.x[late(task), part, 2][:, on_face(body.mesh, 2, 1 - 2 * k)]
         worst = max(worst, abs(float(z.mean()) - exact) / OVERLAP)
     return worst

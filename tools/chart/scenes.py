@@ -112,8 +112,9 @@ def gap(pressed: tuple, task: Task, motion: Motion) -> float:
     The median of the last frames: a hop between two impacts is no gap, one that stays is. Bodies
     that went through each other have no overlap any more, but end further apart than an edge.
     """
-    built = task.scene()
-    found = {body.label: (body.mesh, part) for body, part in Numbered(built).with_parts(built)}
+    scene = task.scene()
+    parts = zip(scene.bodies, Numbered(scene).parts, strict=True)
+    found = {body.label: (body.mesh, part) for body, part in parts}
     worst = 0.0
     for (one, here), (two, there) in (map(found.get, pair) for pair in pressed):
         frames = motion.x[late(task, LATE)]

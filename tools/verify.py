@@ -53,14 +53,15 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the jittered meshes")
     args = parser.parse_args()
     wp.config.log_level = wp.LOG_WARNING
-    print(machine.line(), f"response {args.response}, SEED={args.seed}", "", sep="\n")
+    title = f"response {args.response}, SEED={args.seed}"
+    print(machine.line(), title, "", sep="\n")
     print(report.FIGURES.head())
     chosen = [CASES[name] for name in args.cases or CASES]
     ask = Ask(args.quick, args.response, args.seed)
     found = run({title: partial(figures, where, ask) for title, where in chosen})
     print("", *(f"{title}: {lowest(kept)}" for title, kept in found.items()), sep="\n")
     if args.csv:
-        report.write(args.csv, [figure for kept in found.values() for figure in kept])
+        report.write(args.csv, [f for kept in found.values() for f in kept], title=title)
     return status(found)
 
 

@@ -10,6 +10,7 @@ from warp_contact.data import (
     contacts,
     narrow_phase,
     overflow,
+    scan,
     surface,
     sweeps,
     warm_start,
@@ -23,22 +24,23 @@ from warp_contact.kernels.mobility import Mobility
 
 @dataclass
 class Work:
-    """Forgotten after each step, but for ``warm``, the broad phase and the forces of the frame.
+    """Rewritten in each step, except for ``warm``, the broad phase and the forces of the frame.
 
     Attributes:
-        capacity: what there is room for
+        capacity: of the lists
         overflow: what did not fit
         dt: the step [s], shape (1,)
-        share: of the stages of the damping [-], shape (1,)
+        share: weight of the damped velocity [-], shape (1,)
         steps: how many the frame still has, shape (1,)
         awake: what moves
-        mesh: what searches for contacts read of the model
+        mesh: what the search for contacts reads of the model
         mobility: how vertices answer impulses
+        scan: scratch of running sums
         f_tet: forces on the corners of each tet [N], shape (4 n_tet,)
-        x: predicted positions, then those before stage 4 [m], shape (n_vert,)
+        x: predicted positions, then those before the search [m], shape (n_vert,)
         v: scratch of the damping [m/s], shape (n_vert,)
         broad_phase: which pairs may touch
-        narrow_phase: which of them do, on the way to contacts
+        narrow_phase: intermediate results on the way to the contacts
         contacts: the contacts of the step
         sweeps: counters of the sweeps over them
         surface: scratch of the search for the contact surface
@@ -54,6 +56,7 @@ class Work:
     awake: Awake
     mesh: Mesh
     mobility: Mobility
+    scan: list[wp.array[int]]
     f_tet: wp.array[wp.vec3]
     x: wp.array[wp.vec3]
     v: wp.array[wp.vec3]
@@ -82,7 +85,7 @@ def allocate_work(
     awake: Awake | None = None,
     unit: float = 1.0,
 ) -> Work:
-    """Room for a step on the current device; the Bvhs are built around ``state.x``.
+    """Allocate for a step on the current device; the Bvhs are built around ``state.x``.
 
     Args:
         model: what does not change
@@ -103,6 +106,9 @@ def allocate_work(
         awake=awake or everything(model),
         mesh=mesh_of(model, broad.surface),
         mobility=mobility_of(model),
+        scan=scan.allocate(
+            max(2 * n + 2, model.n_edge + 1, capacity.verts + 1, capacity.edges + 1)
+        ),
         f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=wp.zeros(n, dtype=wp.vec3),
         v=wp.zeros(n, dtype=wp.vec3),

@@ -1,6 +1,6 @@
-"""Which vertices may come to lie in which bodies, and which edges may come to cross them.
+"""Broad phase: which vertices may enter which bodies, and which edges may cross them.
 
-Found now and then, kept for many steps.
+Pairs are found now and then, and kept for many steps.
 """
 
 from functools import partial
@@ -11,6 +11,7 @@ from warp_contact.data import boxes
 from warp_contact.data.broad_phase import Pairs
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.scan import scan
 from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.broad_phase import edges, hashing, near, skins
@@ -18,7 +19,7 @@ from warp_contact.kernels.broad_phase import pairs as kernels
 
 
 def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
-    """Find the pairs at ``x0`` unless those at hand hold for a step from ``x0`` to ``x1``."""
+    """Find the pairs at ``x0`` unless the present ones hold for a step from ``x0`` to ``x1``."""
     b = work.broad_phase
     if not on("broad phase kept"):
         b.stale.fill_(1)
@@ -32,7 +33,7 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
 
 
 def track(model: Model, x: wp.array, work: Work) -> None:
-    """Let the bodies go on to ``x``, where pairs are looked at; ``n_new`` is 0 then."""
+    """Begin a detection pass at ``x``: add the distances travelled, and set ``n_new`` to 0."""
     b = work.broad_phase
     _move(model, x, work)
     outputs = [b.motion, b.recent, b.travelled, work.narrow_phase.n_new]
@@ -69,7 +70,7 @@ def _list_none(work: Work) -> None:
 
 
 def _move(model: Model, x: wp.array, work: Work) -> None:
-    """Add to ``motion`` what is new at ``x``."""
+    """Update ``motion`` by the motion up to ``x``."""
     b = work.broad_phase
     chunks = -(-model.n_vert // int(skins.CHUNK))
     inputs = [model.vert_body, x]
@@ -111,7 +112,7 @@ def _find_near(model: Model, work: Work) -> None:
         dim=model.n_body,
         inputs=[model.cell, b.skin, b.bodies.id, model.body_world, model.body_vert]
         + [work.awake.bodies, b.lower, b.upper, b.x],
-        outputs=[of.n_near, of.near, of.slab, of.end, b.any_pair],
+        outputs=[of.n_near, of.other, of.slab, of.end, b.any_pair],
     )
 
 
@@ -123,7 +124,7 @@ def _find_parts(model: Model, work: Work) -> None:
     b.n_found.zero_()
     wp.launch(
         near.near_parts,
-        dim=of.near.shape,
+        dim=of.other.shape,
         inputs=[b.skin, work.mesh, of, b.x],
         outputs=[of.part, b.near_tri, b.n_found],
     )
@@ -145,7 +146,7 @@ def _find_tets(model: Model, work: Work) -> None:
         inputs=[model.cell, b.skin, model.vert_body, b.near, b.x],
         outputs=[b.key, b.cell_start],
     )
-    wp.utils.array_scan(b.cell_start, b.cell_start, inclusive=True)
+    scan(b.cell_start, work.scan, inclusive=True)
     wp.launch(
         hashing.fill_cells,
         dim=model.n_vert,
@@ -168,7 +169,7 @@ def _find_tets(model: Model, work: Work) -> None:
             outputs=[b.vert_tet, b.n_found],
         )
     overflow = work.overflow.verts, work.overflow.tets
-    _by_pair(b.n_found, b.vert_tet, model.tet_body, b.verts, *overflow)
+    _by_pair(b.n_found, b.vert_tet, model.tet_body, b.verts, work, *overflow)
 
 
 def _find_tris(model: Model, work: Work) -> None:
@@ -182,7 +183,7 @@ def _find_tris(model: Model, work: Work) -> None:
         outputs=[b.edge_tri, b.n_found],
     )
     overflow = work.overflow.edges, work.overflow.tris
-    _by_pair(b.n_found, b.edge_tri, model.tri_body, b.edges, *overflow)
+    _by_pair(b.n_found, b.edge_tri, model.tri_body, b.edges, work, *overflow)
 
 
 def _by_pair(
@@ -190,6 +191,7 @@ def _by_pair(
     found: wp.array,
     item_body: wp.array,
     pairs: Pairs,
+    work: Work,
     pairs_needed: wp.array,
     items_needed: wp.array,
 ) -> None:
@@ -203,7 +205,7 @@ def _by_pair(
         inputs=[n_found, found],
         outputs=[pairs.item_start, items_needed],
     )
-    wp.utils.array_scan(pairs.item_start, pairs.item_start, inclusive=True)
+    scan(pairs.item_start, work.scan, inclusive=True)
     launch_over(
         kernels.fill_items,
         found.shape[0],
@@ -216,7 +218,7 @@ def _by_pair(
         inputs=[item_body, pairs.item_start],
         outputs=[to.item, to.start],
     )
-    wp.utils.array_scan(to.start, to.start, inclusive=False)
+    scan(to.start, work.scan, inclusive=False)
     launch_over(
         kernels.list_pairs,
         n_owner,

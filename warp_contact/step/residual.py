@@ -1,4 +1,4 @@
-"""What the impulses leave of overlaps: the work of the closure and of the search."""
+"""Residual overlaps after the impulses, for the closure and the search."""
 
 import warp as wp
 
@@ -9,7 +9,7 @@ from warp_contact.kernels.surface import residual as kernels
 
 
 def find_gaps(model: Model, x: wp.array, work: Work) -> None:
-    """Set ``surface.residual`` at ``x``, and what of it is to be closed or searched."""
+    """Set ``surface.residual`` at ``x``, and whether any of it is to be closed or searched."""
     work.surface.of_step.zero_()
     add_gaps(model, x, work)
 

@@ -184,6 +184,7 @@ def held(heights) -> tuple:
     """The squeezed sphere with its upper cube at so many edges over the sphere, frame by frame."""
     from chart import scenes
     from engines.task import Motion, Numbered
+    from verification.setup import mean_edge
 
     task, panels = scenes.scene("squeezed_sphere", True)
     scene = task.scene()
@@ -191,7 +192,7 @@ def held(heights) -> tuple:
     _, ball, top = whole.parts
     x = whole.rest.copy()
     x[ball, 2] -= distance_of(scene, 0, 1)
-    unit = min(scenes.edge(scene.bodies[k].mesh) for k in (1, 2))
+    unit = min(mean_edge(scene.bodies[k].mesh) for k in (1, 2))
     frames = np.repeat(x[None], task.frames + 1, axis=0)
     frames[:, top, 2] -= frames[0, top, 2].min() - frames[0, ball, 2].max()
     frames[:, top, 2] += unit * np.broadcast_to(heights, task.frames + 1)[:, None]
@@ -218,12 +219,13 @@ def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
     from chart import scenes
     from engines import ours
     from engines.settings import DEFAULT
+    from verification.setup import mean_edge
 
     task, (*_, panel) = scenes.scene("squeezed_sphere", True)
     motion = ours.run(task, DEFAULT, None, np.inf)
     # 0.0016 was seen; another machine may round other contacts into being.
     assert 0.0 < panel.error(task, motion) < 0.01
-    edges = [scenes.edge(body.mesh) for body in task.scene().bodies]
+    edges = [mean_edge(body.mesh) for body in task.scene().bodies]
     shift = np.array([0.0, 0.1 * np.mean(edges), 0.0])
     there = replace(motion, x=scenes.converged(task) + shift)
     # Positions are kept in float32, of bodies ten edges wide.

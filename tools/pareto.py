@@ -14,7 +14,7 @@ pictures of a table again, beside it.
 
 import statistics
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -119,7 +119,7 @@ def save(folder: Path, first: str, titles: dict[str, str], found: list[Point]) -
     print(text)
 
 
-def draw(folder: Path, titles: dict[str, str], found: Iterable[Point]) -> None:
+def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:
     """Where matplotlib is installed, the picture of all panels and that of four."""
     try:
         from chart import picture

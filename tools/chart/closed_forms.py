@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 from engines.task import Failed, Motion, Task
 from verification import collision, hertz, weight
+from verification.columns import Column, Pile
 from verification.setup import G, on_face
 
 import warp_contact as wc
@@ -21,12 +22,11 @@ Shown = tuple[Task, list[Panel]]
 ZETA = 0.35  # damping ratio of the slowest mode, where bodies come to rest
 
 
-def pushed_down(
-    scene: wc.Scene, mesh: wc.TetMesh, rubber: wc.NeoHookean, z: float, held: np.ndarray, v: float
-) -> None:
-    """Add a body at height z [m] whose held vertices move down at v [m/s]."""
-    velocity = np.where(held[:, None], (0.0, 0.0, -v), 0.0)
-    scene.add_body(mesh, rubber, (0.0, 0.0, z), velocity=velocity, fixed=held)
+def lowered(scene: wc.Scene, v: float) -> wc.Scene:
+    """The scene, with the held vertices of its last body moving down at v [m/s]."""
+    body = scene.bodies[-1]
+    body.v[body.fixed] = 0.0, 0.0, -v
+    return scene
 
 
 # A1: the upper column, ten times stiffer, is pushed onto the lower one; exact is where two bars of
@@ -40,18 +40,15 @@ CELLS, QUICK_CELLS = ((3, 3, 6), (4, 4, 6)), ((2, 2, 4), (3, 3, 4))
 
 def springs(quick: bool) -> Shown:
     """A1."""
-    push = round(PUSH * PUSH_FPS)
+    push, beta = round(PUSH * PUSH_FPS), 2.0 * ZETA / (0.5 * np.pi * SPEED)
+    columns = [
+        Column(young, 1.0, young / SPEED**2, cells, damping=beta)
+        for young, cells in zip((SOFT, STIFF), QUICK_CELLS if quick else CELLS, strict=True)
+    ]
 
     def build() -> wc.Scene:
-        beta = 2.0 * ZETA / (0.5 * np.pi * SPEED)
-        scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
-        for k, cells in enumerate(QUICK_CELLS if quick else CELLS):
-            young, mesh = (SOFT, STIFF)[k], wc.box(1.0, cells)
-            rubber = wc.NeoHookean(young, 0.0, young / SPEED**2, beta)
-            v = k * (OVERLAP + SPACE) * PUSH_FPS / push
-            held = on_face(mesh, 2, 2 * k - 1)
-            pushed_down(scene, mesh, rubber, 0.5 + k * (1.0 + SPACE), held, v)
-        return scene
+        scene = Pile(columns, SPACE, clamped=True).build(wc.NeoHookean)
+        return lowered(scene, (OVERLAP + SPACE) * PUSH_FPS / push)
 
     task = Task(build, PUSH_FPS, push + round(SETTLE * PUSH_FPS), SOFT / 16.0, stop=push)
     title = "A1 series springs 1:10\nplace of the surface [of the overlap]"
@@ -62,7 +59,7 @@ def place(task: Task, motion: Motion) -> float:
     """How far the mean heights of both faces are off, the worse of the two [of the overlap]."""
     whole, _ = sound(task, motion)
     exact, worst = meeting(motion.law), 0.0
-    for k, (body, part) in enumerate(whole.with_parts(task.scene())):
+    for k, (body, part) in enumerate(zip(task.scene().bodies, whole.parts, strict=True)):
         z = motion.x[late(task), part, 2][:, on_face(body.mesh, 2, 1 - 2 * k)]
         worst = max(worst, abs(float(z.mean()) - exact) / OVERLAP)
     return worst
@@ -101,9 +98,8 @@ def pressed(quick: bool) -> Shown:
         omega = 0.5 * np.pi * hertz.pressure_wave(hertz.YOUNG) / hertz.HEIGHT
         rubber = wc.NeoHookean(hertz.YOUNG, hertz.POISSON, hertz.DENSITY, 2.0 * ZETA / omega)
         held = mesh.vertices[:, 2] > 0.999 * hertz.HEIGHT
-        v = (depth + HERTZ_SPACE) * HERTZ_FPS / push
-        pushed_down(scene, mesh, rubber, HERTZ_SPACE, held, v)
-        return scene
+        scene.add_body(mesh, rubber, (0.0, 0.0, HERTZ_SPACE), fixed=held)
+        return lowered(scene, (depth + HERTZ_SPACE) * HERTZ_FPS / push)
 
     frames = push + round(HERTZ_SETTLE * HERTZ_FPS)
     task = Task(build, HERTZ_FPS, frames, hertz.YOUNG * CONTACT / n, stop=push)
@@ -201,19 +197,14 @@ def ladder(quick: bool) -> Shown:
     """A7m; the quick run is the same."""
     del quick
     young = 20.0 * RATIO * LIGHT * G * EDGE  # 5 % of strain
+    omega = np.sqrt(young / (RATIO * LIGHT)) / EDGE
+    pile = weight.cubes(RATIO, young, 2.0 * LADDER_ZETA / omega)
 
     def build() -> wc.Scene:
-        omega = np.sqrt(young / (RATIO * LIGHT)) / EDGE
-        scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=0.3)
-        for k, density in enumerate((LIGHT, RATIO * LIGHT)):
-            mesh = wc.box(EDGE, weight.CUBES[k])
-            rubber = wc.NeoHookean(young, 0.0, density, 2.0 * LADDER_ZETA / omega)
-            held = None if k else on_face(mesh, 2, -1)
-            scene.add_body(mesh, rubber, (0.0, 0.0, k * (EDGE + weight.APART)), fixed=held)
-        return scene
+        return pile.build(wc.NeoHookean)
 
     def start(scene: wc.Scene) -> np.ndarray:
-        return np.concatenate(weight.cubes(RATIO, young).static(scene))
+        return np.concatenate(pile.static(scene))
 
     frames = round(LADDER_TIME * LADDER_FPS)
     task = Task(build, LADDER_FPS, frames, 0.1 * young * EDGE, start=start)

@@ -11,7 +11,11 @@ HEAD += "start-up s", "shown"
 
 @dataclass(frozen=True)
 class Point:
-    """A method at one setting in one panel: an error and what it cost, or why there is none."""
+    """A method at one setting in one panel: an error and what it cost, or why there is none.
+
+    A type of its own beside ``measure.figure.Figure``, which has no cost: points are ahead of each
+    other in both, and none is judged by a limit.
+    """
 
     panel: str
     method: str

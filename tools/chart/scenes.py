@@ -18,6 +18,7 @@ from engines import ours
 from engines.settings import DEFAULT
 from engines.task import Failed, Motion, Numbered, Task
 from verification.scenes import in_edges
+from verification.setup import mean_edge
 
 import warp_contact as wc
 from chart.distance import distance
@@ -75,7 +76,7 @@ def astray(pressed: tuple, task: Task, motion: Motion) -> float:
 
 def rms_distance(task: Task, one: np.ndarray, other: np.ndarray) -> float:
     """Root mean square distance of two motions, in mean edges of the scene."""
-    unit = np.mean([edge(body.mesh) for body in task.scene().bodies])
+    unit = np.mean([mean_edge(body.mesh) for body in task.scene().bodies])
     return float(np.sqrt(((one - other) ** 2).sum(axis=2).mean()) / unit)
 
 
@@ -111,18 +112,14 @@ def gap(pressed: tuple, task: Task, motion: Motion) -> float:
     The median of the last frames: a hop between two impacts is no gap, one that stays is. Bodies
     that went through each other have no overlap any more, but end further apart than an edge.
     """
-    built = task.scene()
-    found = {body.label: (body.mesh, part) for body, part in Numbered(built).with_parts(built)}
+    scene = task.scene()
+    parts = zip(scene.bodies, Numbered(scene).parts, strict=True)
+    found = {body.label: (body.mesh, part) for body, part in parts}
     worst = 0.0
     for (one, here), (two, there) in (map(found.get, pair) for pair in pressed):
         frames = motion.x[late(task, LATE)]
         d = [distance(x[here], one.surface, x[there], two.surface) for x in frames]
-        worst = max(worst, float(np.median(d)) / min(edge(one), edge(two)))
+        worst = max(worst, float(np.median(d)) / min(mean_edge(one), mean_edge(two)))
     if worst >= TUNNELLED:
         raise Failed(f"pressed bodies end apart ({worst:.2g} edges)")
     return worst
-
-
-def edge(mesh: wc.TetMesh) -> float:
-    """Mean edge at rest [m], as overlaps are measured in."""
-    return float(np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1), axis=2).mean())

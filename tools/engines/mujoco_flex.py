@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 from job import CannotDo, main, mean_edge
 
-HEAVY = 1e6  # mass of what is on rails [kg]
+RAILS = "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
+RAILS += '<inertial pos="0 0 0" mass="1e6" diaginertia="1 1 1"/>'
 
 
 class Engine:
@@ -38,11 +39,8 @@ class Engine:
         self.rails = []
         for k in range(m.nbody):
             if m.body(k).name.startswith("held"):
-                index = int(m.body(k).name[4:])
-                v = scene.v[(scene.body == index) & scene.fixed][0]
-                self.rails.append((m.body_dofadr[k] + np.arange(3), v.copy()))
-        self.count = len(scene.x)
-        self.held = scene.fixed
+                held = scene.fixed & (scene.body == int(m.body(k).name[4:]))
+                self.rails.append((m.body_dofadr[k] + np.arange(3), scene.v[held][0].copy()))
         mujoco.mj_forward(m, d)
 
     def step_frame(self) -> None:
@@ -56,7 +54,7 @@ class Engine:
         """Positions [m] and velocities [m/s]."""
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_flex(self.model, self.data)
-        v = np.zeros((self.count, 3))
+        v = np.zeros_like(self.data.flexvert_xpos)
         v[self.loose] = self.data.qvel[self.dof]
         return self.data.flexvert_xpos.copy(), v
 
@@ -67,15 +65,11 @@ class Engine:
 
 def xml(scene, job: dict, setting: dict, dt: float) -> str:
     """The model in MuJoCo's language."""
-    friction = max(job["friction"], 1e-5)
-    contact = (
-        f'<contact selfcollide="none" solref="{setting["time_constant"] * dt:.9g} 1" '
-        f'friction="{friction:g} 0 0" condim="{3 if job["friction"] else 1}"/>'
-    )
+    mu = job["friction"]
+    touch = f'friction="{max(mu, 1e-5):g} 0 0" condim="{3 if mu else 1}" '
+    touch += f'solref="{setting["time_constant"] * dt:.9g} 1"'
     parts = [
-        f'<geom type="plane" size="0 0 1" zaxis="{_row(n)}" pos="{_row(np.array(n) * h)}" '
-        f'friction="{friction:g} 0 0" condim="{3 if job["friction"] else 1}" '
-        f'solref="{setting["time_constant"] * dt:.9g} 1"/>'
+        f'<geom type="plane" size="0 0 1" zaxis="{_row(n)}" pos="{_row(np.array(n) * h)}" {touch}/>'
         for *n, h in scene.planes.tolist()
     ]
     radius = setting["radius"] * mean_edge(scene)
@@ -86,17 +80,15 @@ def xml(scene, job: dict, setting: dict, dt: float) -> str:
         if moving and np.ptp(scene.v[mine][held], axis=0).max() > 1e-12:
             raise CannotDo("held vertices of one body with several velocities")
         pin = f'<pin id="{" ".join(map(str, held))}"/>' if len(held) else ""
-        rails = "".join(
-            f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1") if moving
-        )
-        mass = f'<inertial pos="0 0 0" mass="{HEAVY}" diaginertia="1 1 1"/>' if moving else ""
+        rails = RAILS if moving else ""
         parts.append(
-            f'<body name="{"held" if moving else "body"}{k}" gravcomp="{int(moving)}">{rails}{mass}'
+            f'<body name="{"held" if moving else "body"}{k}" gravcomp="{int(moving)}">{rails}'
             f'<flexcomp name="flex{k}" type="direct" dim="3" mass="{scene.mass[mine].sum()}" '
             f'radius="{radius}" point="{_row(scene.rest[mine].ravel())}" '
             f'element="{" ".join(map(str, (scene.tets[scene.tet_body == k] - mine[0]).ravel()))}">'
             f'<elasticity young="{scene.young[k]}" poisson="{scene.poisson[k]}" '
-            f'damping="{scene.damping[k]}"/>{contact}{pin}</flexcomp></body>'
+            f'damping="{scene.damping[k]}"/><contact selfcollide="none" {touch}/>{pin}'
+            "</flexcomp></body>"
         )
     return (
         f'<mujoco><option timestep="{dt:.12g}" integrator="discrete" '

@@ -60,6 +60,7 @@ def write(folder: Path, task: Task, settings: list[dict], limit: float) -> None:
     """The scene as arrays, numbered through all bodies, and what to do with it."""
     scene = task.scene()
     bodies, whole = scene.bodies, Numbered(scene)
+    parts = zip(bodies, whole.parts, strict=True)
     materials = [body.material for body in bodies]
     np.savez(
         folder / "scene.npz",
@@ -68,7 +69,7 @@ def write(folder: Path, task: Task, settings: list[dict], limit: float) -> None:
         v=np.concatenate([body.v for body in bodies]),
         fixed=np.concatenate([body.fixed for body in bodies]),
         tets=whole.tets,
-        surface=np.concatenate([b.mesh.surface + p.start for b, p in whole.with_parts(scene)]),
+        surface=np.concatenate([b.mesh.surface + p.start for b, p in parts]),
         mass=whole.mass,
         body=np.repeat(np.arange(len(bodies)), [len(body.x) for body in bodies]),
         tet_body=np.repeat(np.arange(len(bodies)), [len(body.mesh.tets) for body in bodies]),

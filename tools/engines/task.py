@@ -57,13 +57,9 @@ class Numbered:
         self.parts = [slice(*ends) for ends in pairwise(starts)]  # vertices of each body
         self.rest = np.concatenate([b.x for b in bodies])  # (n, 3) [m], as placed
         self.mass = np.concatenate([_masses(b) for b in bodies])  # (n,) [kg], a quarter of each tet
-        self.tets = np.concatenate([b.mesh.tets + p.start for b, p in self.with_parts(scene)])
+        self.tets = np.concatenate([b.mesh.tets + k for b, k in zip(bodies, starts, strict=False)])
         lame = [np.tile(b.material.lame(), (len(b.mesh.tets), 1)) for b in bodies]
         self.lame = np.concatenate(lame)  # (m, 2) [Pa]: mu, lam
-
-    def with_parts(self, scene: wc.Scene):
-        """Each body with its part."""
-        return zip(scene.bodies, self.parts, strict=True)
 
 
 def _masses(body) -> np.ndarray:

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 
 import numpy as np
+from verification.setup import mean_edge
 
 import warp_contact as wc
 from trials.outcome import SUNK, Record
@@ -84,12 +85,6 @@ def response(method: str, scene: wc.Scene):
     mobile = [b for b in scene.bodies if not b.fixed.all()]
     stiffness = min(b.material.youngs_modulus * mean_edge(b.mesh) for b in mobile)
     return wc.Penalty(float(method.split()[1]) * stiffness)
-
-
-def mean_edge(mesh: wc.TetMesh) -> float:
-    """Mean length of an edge [m]."""
-    p, q = mesh.edges.T
-    return float(np.linalg.norm(mesh.vertices[p] - mesh.vertices[q], axis=1).mean())
 
 
 class Watch:

@@ -12,9 +12,7 @@ FLUSH = wp.constant(1.0e-5)  # a vertex this deep lies in the surface
 BOX_GROWTH = wp.constant(1.0e-5)  # rays must not miss the box of a flat triangle
 IMPULSE_TOLERANCE = wp.constant(1.0e-5)  # a smaller approach in a step is left to the closure
 CLOSURE_TOLERANCE = wp.constant(1.0e-4)  # a smaller overlap is left to the resting gap
-REST_GAP = wp.constant(
-    2.0e-4
-)  # between bodies in contact: rounding does not decide which vertex is inside
+REST_GAP = wp.constant(2.0e-4)  # resting gap: rounding does not decide which vertex is inside
 FLUSH_EDGE = wp.constant(2.0e-4)  # an edge this deep lies in the face, whatever its direction
 VERTEX_MARGIN = wp.constant(1.0e-3)  # speculative: a vertex this close makes a contact with a gap
 OLD_OVERLAP = wp.constant(1.0e-3)  # at the start of a step: a deeper one is for the search
@@ -30,6 +28,6 @@ ISLAND_GAP = wp.constant(2.0e-2)  # boxes this close belong to one island
 SEARCH_BOUND = wp.constant(2.0e-2)  # the largest move in a step: more would invert a deep body
 LEAST_SKIN = wp.constant(2.0e-2)  # for what friction and closure move at rest
 MEAN_SKIN = wp.constant(8.0e-2)  # a wider skin costs more by its longer lists
-PERSISTENT = wp.constant(0.5 * 2.0e-2)  # half of LEAST_SKIN: contacts this close are among the pairs
+PERSISTENT = wp.constant(0.5 * 2.0e-2)  # half of LEAST_SKIN: contacts within are among the pairs
 LINGERING = wp.constant(2.5e-2)  # as TRAVEL, while overlaps may last some steps
-TRAVEL = wp.constant(1.0e-1)  # in a step, against anything else: an impact crushes no tet at once
+TRAVEL = wp.constant(1.0e-1)  # largest relative motion in a step: an impact crushes no tet at once

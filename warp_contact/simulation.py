@@ -180,9 +180,9 @@ class Simulation:
         """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
 
         The partner is a body's index, n_body + p for plane p, -1 for none. Partner and penetration
-        are those of the last detection pass of the last step. That is at the predicted positions,
-        after them where the step moved surfaces, and with a penalty at the start of the step.
-        Persistent contacts of edges have no penetration. Shapes (n_vert,).
+        are those of the last detection pass: at the predicted positions, after the closure where it
+        moved surfaces, at the start of the step for a penalty. Persistent contacts of edges have no
+        penetration. Shapes (n_vert,).
         """
         return contact_fields(self.model, self.state.x, self._stepper.work, 1.0 / self.fps)
 

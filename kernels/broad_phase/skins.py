@@ -1,4 +1,4 @@
-"""Broad phase: pairs that hold while nothing moves further than a skin (Verlet 1967).
+"""Stage 2, broad phase: pairs that hold while nothing moves further than a skin (Verlet 1967).
 
 Pairs are found at the positions of some step and kept for many steps. As long as no vertex is
 further from there than the skin of its body, the pairs include all contacts. Each step tests them

@@ -1,4 +1,4 @@
-"""Motion of the vertices: corner forces gathered, symplectic Euler, damping.
+"""Stage 1, predict: corner forces gathered, symplectic Euler, damping.
 
     f_i = sum of f_tet over the corners at vertex i        [N]
     v'  = v + h (f / m + g)                                [m/s]

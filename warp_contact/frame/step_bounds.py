@@ -24,7 +24,7 @@ CUT_SHORT = 2.0  # the same, in one that was stopped before its end
 EXPLODED = 4.0  # times the frequency that the step was chosen for, at most
 REACH = 0.25  # of the thinnest body: the largest relative motion in a step
 PATIENCE = 2.0  # times the stable number of steps: more are not taken for TRAVEL or LINGERING
-BLURRED = 1.05  # times the stable step: the uncertainty of that
+BLURRED = 1.05  # times the stable step: its uncertainty
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 lets some pass
 KEEP = (
     0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it

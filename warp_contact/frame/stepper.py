@@ -74,7 +74,7 @@ class Stepper:
         self._model, self._state, self._response = model, state, response
         self._step_count = StepCount(model, response, fps, wanted)
         self.spectrum = Spectrum(model)
-        # Without gravity, a body that hardly moves need not be supported: it may fly.
+        # Without gravity, a slow body may be in free flight, not at rest.
         may_sleep = sleeping and any(model.gravity)
         self.sleeping = Sleeping(model, state, fps) if may_sleep else None
         inv_mass = model.inv_mass.numpy()

@@ -17,9 +17,7 @@ from warp_contact.step.contact_graph import order_by_vertex
 from warp_contact.step.narrow_phase import append_edge_contacts
 
 SWEEPS = 48  # at most; few clusters of contacts last so long
-NEGLIGIBLE = (
-    0.1  # of the tolerance, at the shortest edge: less does not affect other contacts
-)
+NEGLIGIBLE = 0.1  # of the tolerance, at the shortest edge: less does not affect other contacts
 
 
 def solve(model: Model, state: State, work: Work) -> None:

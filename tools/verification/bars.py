@@ -157,7 +157,8 @@ def record(impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)) -
     # A contact as stiff as an element of the bar, five times: a penalty that is not seen.
     respond = ask.respond(5.0 * impact.bars[0].young * width / across[0])
     sim = wc.Simulation(scene, respond, fps=1.0 / impact.frame)
-    energy, touch = sim.measure().energy, GAP * impact.plateau
+    energy = sim.measure().energy
+    touch = GAP * impact.plateau
     last = touch + impact.contact + AFTER * impact.bars[0].round_trip
 
     def look() -> tuple[float, ...]:
@@ -166,7 +167,8 @@ def record(impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)) -
         return pressure, now.energy / energy, sim.substeps, sim.time - touch
 
     found = watch(sim, int(np.ceil(last / impact.frame)) * impact.frame, look).T
-    body, mass = sim.model.vert_body.numpy(), masses(sim)
+    body = sim.model.vert_body.numpy()
+    mass = masses(sim)
     speeds = np.bincount(body, mass * sim.velocities()[:, 2]) / np.bincount(body, mass)
     return History(*found, float(abs(speeds[-1] - sum(speeds[:-1])) / impact.approach))
 
@@ -186,7 +188,8 @@ def release(found: History, pressure: np.ndarray, impact: Impact) -> float:
 
 def hit(label: str, impact: Impact, ask: Ask, n: int, across=(1, 1)) -> Figures:
     """Restitution, pressure, release and energies of an impact."""
-    found, round_trip = record(impact, ask, n, across), impact.bars[0].round_trip
+    found = record(impact, ask, n, across)
+    round_trip = impact.bars[0].round_trip
     yield relative(label, "restitution", found.e, impact.e, RESTITUTION)
     inner = (found.time > 0.15 * impact.plateau) & (found.time < 0.85 * impact.plateau)
     p = found.pressure[inner] / impact.pressure

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from warp_contact.materials import NeoHookean
-from warp_contact.mesh import TetMesh
-from warp_contact.scene import Scene
-from warp_contact.shapes import dish, drum, sphere
+from warp_contact.scene.materials import NeoHookean
+from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.scene import Scene
+from warp_contact.scene.shapes import dish, drum, sphere
 
 DISH = {"radius": 0.5, "depth": 0.4, "thickness": 0.035, "rings": 14}  # [m]
 COUNTS = {"melon": 46, "banana": 64, "apple": 111, "lemon": 111}

@@ -7,10 +7,10 @@ weight W over n vertices of stiffness k, and stiffness enough for it is too much
 
 import numpy as np
 
-from warp_contact.materials import NeoHookean
-from warp_contact.mesh import TetMesh
-from warp_contact.scene import Scene
-from warp_contact.shapes import box
+from warp_contact.scene.materials import NeoHookean
+from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.scene import Scene
+from warp_contact.scene.shapes import box
 
 MEMBRANE = (0.6, 0.6, 0.015)  # [m]
 EDGE = 0.1  # of a cube [m]

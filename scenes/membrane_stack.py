@@ -5,9 +5,9 @@ potential energy over time: the stack comes to rest and stays as high as its own
 With penalty forces it is pressed together further, and it goes on moving for longer.
 """
 
-from warp_contact.materials import NeoHookean
-from warp_contact.scene import Scene
-from warp_contact.shapes import box
+from warp_contact.scene.materials import NeoHookean
+from warp_contact.scene.scene import Scene
+from warp_contact.scene.shapes import box
 
 COUNT = 9
 WIDTH, THICKNESS = 0.4, 0.01  # [m]

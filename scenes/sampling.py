@@ -7,10 +7,10 @@ bodies has the fine mesh, and the two sides of the picture settle alike.
 
 import numpy as np
 
-from warp_contact.materials import NeoHookean
-from warp_contact.mesh import TetMesh
-from warp_contact.scene import Scene
-from warp_contact.shapes import box
+from warp_contact.scene.materials import NeoHookean
+from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.scene import Scene
+from warp_contact.scene.shapes import box
 
 RADIUS = 0.1  # of the arch's middle line [m]
 WIDTH = 0.05  # of the arch's square section [m]

@@ -5,9 +5,9 @@ vertices touch. Look at the flattened poles of the sphere: its surface follows t
 cubes keep their shape. The top of the upper cube comes down at a given speed.
 """
 
-from warp_contact.materials import NeoHookean
-from warp_contact.scene import Scene, rotation_matrix
-from warp_contact.shapes import box, sphere
+from warp_contact.scene.materials import NeoHookean
+from warp_contact.scene.scene import Scene, rotation_matrix
+from warp_contact.scene.shapes import box, sphere
 
 RADIUS = 0.06  # of the sphere [m]
 EDGE = 0.1  # of a cube [m]

@@ -9,10 +9,10 @@ For a Poisson's ratio of 0 it is two springs in series: p = g / (L/E1 + L/E2), s
 
 import numpy as np
 
-from warp_contact.materials import NeoHookean
-from warp_contact.mesh import TetMesh
-from warp_contact.scene import Scene
-from warp_contact.shapes import box
+from warp_contact.scene.materials import NeoHookean
+from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.scene import Scene
+from warp_contact.scene.shapes import box
 
 EDGE = 0.1  # of a block [m]
 YOUNG = 5e4  # of the soft blocks [Pa]

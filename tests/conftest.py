@@ -113,7 +113,7 @@ def at_vertices():
 @pytest.fixture
 def forces_of():
     """Vertex forces [N] of ``forces_of(model, x)``."""
-    from warp_contact import forces
+    from warp_contact.step import forces
 
     def launch(model, x, f_tet):
         mask = wp.full(model.n_tet, 1, dtype=int)
@@ -138,9 +138,9 @@ ROOM |= {"verts": 8192, "tets": 65536, "edges": 8192, "tris": 65536, "near": 655
 
 
 def _stages(scene, capacity=None, dt=1e-3) -> tuple:
-    from warp_contact.assemble import assemble
-    from warp_contact.types import Capacity
-    from warp_contact.work import allocate_work
+    from warp_contact.data.contacts import Capacity
+    from warp_contact.data.work import allocate_work
+    from warp_contact.scene.assemble import assemble
 
     model, state = assemble(scene)
     work = allocate_work(model, state, capacity or Capacity(**ROOM))
@@ -155,11 +155,11 @@ def stages():
 
 
 def _find_contacts(model, work, x0, x=None, edges=False, fresh=False) -> SimpleNamespace:
-    from warp_contact import candidates, solver
+    from warp_contact.step import broad_phase, step
 
     x = x0 if x is None else x
-    candidates.refresh(model, x0, x, work)
-    solver.contacts(model, x0, x, work, fresh, edges)
+    broad_phase.refresh(model, x0, x, work)
+    step.contacts(model, x0, x, work, fresh, edges)
     assert not work.contacts.needed.numpy().any()
     return _records(work)
 

@@ -7,8 +7,9 @@ import numpy as np
 import warp as wp
 from pxr import Usd
 
-from warp_contact import usd
-from warp_contact.shapes import box
+from warp_contact.scene.shapes import box
+from warp_contact.usd import reader
+from warp_contact.usd.writer import UsdWriter
 
 
 class FakeSimulation:
@@ -73,10 +74,10 @@ class FakeSimulation:
 def written(path, n_frames=5, sim=None, **options) -> Usd.Stage:
     """The stage after frames 0 ... n_frames."""
     sim = sim or FakeSimulation()
-    with usd.UsdWriter(path, sim, **options) as writer:
+    with UsdWriter(path, sim, **options) as writer:
         for sim.frame in range(n_frames + 1):
             writer.write()
-    return usd.open_stage(path)
+    return reader.open_stage(path)
 
 
 def surface_ids(sim, b):
@@ -88,7 +89,7 @@ def surface_ids(sim, b):
 def write_forever(out: str) -> None:
     """Write frames in a tight loop and say so after each."""
     sim = FakeSimulation()
-    writer = usd.UsdWriter(out, sim)
+    writer = UsdWriter(out, sim)
     print("start", flush=True)
     while True:
         writer.write()

@@ -8,8 +8,9 @@ from unittest import mock
 import pytest
 import warp as wp
 
-from warp_contact import candidates, depth, impulse, solver, stepper, substeps, surface
-from warp_contact.kernels import edge_contact, vertex_contact
+from warp_contact.frame import step_bounds, stepper
+from warp_contact.kernels.narrow_phase import edge_contact, vertex_contact
+from warp_contact.step import broad_phase, depth, impulse, step, surface
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
@@ -18,12 +19,12 @@ from ablating.off import without
 from ablating.parts import PARTS, Part
 
 OWNERS = (
-    candidates,
+    broad_phase,
     depth,
     impulse,
-    solver,
+    step,
     stepper,
-    substeps,
+    step_bounds,
     surface,
     edge_contact,
     vertex_contact,

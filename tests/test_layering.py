@@ -1,73 +1,116 @@
-"""The import ladder, and the rules of a kernel's signature, read from the source files."""
+"""What each room may import, no circle, and the rules of a kernel's signature, read as text."""
 
 import ast
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "warp_contact"
-KERNELS = sorted((ROOT / "kernels").glob("*.py"))
+HOST = sorted(p for p in PACKAGE.rglob("*.py") if not {"kernels", "scenes"} & {*p.parts})
+KERNELS = sorted((ROOT / "kernels").rglob("*.py"))
 SCENES = sorted((ROOT / "scenes").glob("*.py"))
 
-LADDER = (  # a module imports from lower rungs only
-    {"kernels"},
-    {"topology", "errors", "progress", "response", "types", "usd_scene"}
-    | {"pictures", "launch", "warm"},
-    {"mesh", "materials", "work", "forces", "usd", "checkpoint", "raycast", "diagnosis", "ready"},
-    {"shapes", "scene", "candidates", "depth", "impulse", "spectrum", "measure", "usd_check"}
-    | {"rest", "fields", "placement", "room"},
-    {"assemble", "detect", "surface", "render", "scenes", "substeps"},
-    {"solver", "pace"},
-    {"stepper"},
-    {"simulation"},
-    {"__init__", "commands", "runs"},
-    {"cli"},
-    {"__main__"},
+MAY = {  # room: those that it may import, beside itself
+    "errors": set(),
+    "progress": set(),
+    "data": {"kernels"},
+    "scene": {"kernels", "data"},
+    "step": {"kernels", "data"},
+    "frame": {"kernels", "data", "step", "errors"},
+    "measure": {"kernels", "data", "scene", "step"},
+    "usd": set(),
+    "picture": {"kernels", "usd"},
+    "simulation": {"data", "scene", "step", "frame", "measure", "errors", "progress"},
+    "__init__": {"scene", "step", "measure", "usd", "simulation", "errors"},
+    "command": {"__init__", "errors", "progress", "scene", "step", "simulation", "usd", "picture"},
+    "__main__": {"command"},
+}
+LADDER = (  # of the kernel rooms: each may import those before it
+    {"options"},
+    {"geometry", "sorting"},
+    {"elastic"},
+    {"motion"},
+    {"broad_phase"},
+    {"narrow_phase"},
+    {"impulse"},
+    {"surface"},
+    {"output"},
 )
-RUNG = {name: rung for rung, names in enumerate(LADDER) for name in names}
-SCENES_MAY = {"scene", "shapes", "materials", "mesh", "topology"}
+RUNG = {room: rung for rung, rooms in enumerate(LADDER) for room in rooms}
 ONLY_IN = {  # packages that the solver does without
-    "pxr": {"mesh", "usd_scene", "usd", "usd_check", "render"},
-    "PIL": {"pictures"},
-    "meshio": {"mesh"},
+    "pxr": {"scene/mesh", "usd", "picture/render"},
+    "PIL": {"picture/files"},
+    "meshio": {"scene/mesh"},
     "matplotlib": set(),
 }
 SECTIONS = ("in", "in, out", "out", "out, added to")
 
 
+def name_of(path: Path) -> str:
+    """The name by which a file is imported."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    parts = parts if parts[0] == "warp_contact" else ("warp_contact", *parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 2 else parts)
+
+
+NAMES = {name_of(path) for path in (*HOST, *KERNELS, *SCENES)}
+
+
 def imports(path: Path) -> set[str]:
-    """Absolute names; of ``from warp_contact import x`` that of x when x is a module."""
+    """Absolute names; of ``from a import b`` that of b when it is a module."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path.name}: imports are absolute"
-            if node.module == "warp_contact":
-                found |= {f"warp_contact.{a.name}" for a in node.names if a.name in RUNG}
-            else:
-                found.add(node.module)
+            full = {f"{node.module}.{alias.name}" for alias in node.names}
+            modules = full & NAMES
+            found |= modules
+            if modules != full:
+                root = node.module == "warp_contact"
+                found.add("warp_contact.__init__" if root else node.module)
     return found
 
 
 def inner(path: Path) -> set[str]:
     """Modules of this package that a file imports."""
-    return {name.split(".")[1] for name in imports(path) if name.startswith("warp_contact.")}
+    return {name for name in imports(path) if name.startswith("warp_contact.")}
 
 
-@pytest.mark.parametrize("path", sorted(PACKAGE.glob("*.py")), ids=lambda p: p.stem)
-def test_a_module_imports_from_lower_rungs_only(path):
-    assert path.stem in RUNG, f"give {path.name} a rung on the ladder"
-    assert {name for name in inner(path) if RUNG[name] >= RUNG[path.stem]} == set()
+def room(name: str, depth: int = 1) -> str:
+    return name.split(".")[depth]
+
+
+@pytest.mark.parametrize("path", HOST, ids=name_of)
+def test_a_room_imports_only_what_it_may(path):
+    own = room(name_of(path))
+    assert own in MAY, f"give {path.name} a room"
+    assert {room(name) for name in inner(path)} - MAY[own] - {own} == set()
+
+
+@pytest.mark.parametrize("path", KERNELS, ids=name_of)
+def test_a_kernel_room_imports_from_lower_rungs_only(path):
+    if path.parent.name == "kernels" and path.stem == "__init__":
+        return
+    own = room(name_of(path), 2)
+    higher = {n for n in inner(path) if room(n, 2) != own and RUNG[room(n, 2)] >= RUNG[own]}
+    assert higher == set()
+
+
+def test_no_imports_run_in_a_circle():
+    graph = {name_of(path): inner(path) for path in (*HOST, *KERNELS, *SCENES)}
+    list(TopologicalSorter(graph).static_order())  # raises CycleError
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
 def test_a_scene_knows_shapes_and_materials_but_no_solver(path):
-    assert inner(path) <= SCENES_MAY
+    assert {room(name) for name in inner(path)} <= {"scene"}
 
 
-@pytest.mark.parametrize("path", KERNELS, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", KERNELS, ids=name_of)
 def test_a_kernel_file_imports_warp_and_kernel_files_only(path):
     others = {n for n in imports(path) if n != "warp" and not n.startswith("warp_contact.kernels")}
     assert others == set()
@@ -75,9 +118,14 @@ def test_a_kernel_file_imports_warp_and_kernel_files_only(path):
 
 @pytest.mark.parametrize("package", ONLY_IN)
 def test_an_optional_package_stays_in_its_place(package):
-    files = [*PACKAGE.glob("*.py"), *KERNELS, *SCENES]
-    users = {p.stem for p in files if package in {n.split(".")[0] for n in imports(p)}}
-    assert users <= ONLY_IN[package]
+    users = set()
+    for path in (*HOST, *KERNELS, *SCENES):
+        if package in {name.split(".")[0] for name in imports(path)}:
+            users.add(
+                path.relative_to(PACKAGE if path in HOST else ROOT).with_suffix("").as_posix()
+            )
+    allowed = ONLY_IN[package]
+    assert {u for u in users if u not in allowed and u.split("/")[0] not in allowed} == set()
 
 
 def is_warp(node: ast.AST, name: str) -> bool:

@@ -33,10 +33,10 @@ def panel():
 def test_the_impulses_alone_move_no_surface(monkeypatch):
     from charting import methods, ours
 
-    from warp_contact import solver
+    from warp_contact.step import step
 
     calls = []
-    monkeypatch.setattr(solver, "move_surfaces", lambda *args: calls.append(args))
+    monkeypatch.setattr(step, "move_surfaces", lambda *args: calls.append(args))
     settings = {setting.method: setting for setting in methods.own(quick=True)[::-1]}
     ours.run(panel(), settings["impulses alone"], None, 60.0)
     assert calls == []

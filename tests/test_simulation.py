@@ -14,8 +14,8 @@ from warp_contact import (
     TetMesh,
     box,
     sphere,
-    stepper,
 )
+from warp_contact.frame import stepper
 
 G = 9.81
 SOFT = NeoHookean(2e4, 0.3, 1000.0, 1e-3)

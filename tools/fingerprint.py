@@ -248,6 +248,11 @@ def fingerprints(names: list[str]) -> Iterator[tuple[str, str]]:
         yield name, trace.hash.hexdigest()[:16]
 
 
+def title(kernel: wp.Kernel) -> str:
+    """Room, file and name."""
+    return f"{kernel.module.name.removeprefix('warp_contact.kernels.')}.{kernel.key}"
+
+
 @contextmanager
 def launched() -> Iterator[set[str]]:
     """Names of the kernels, with their modules, that are launched within."""
@@ -255,7 +260,7 @@ def launched() -> Iterator[set[str]]:
     launch = wp.launch
 
     def noted(kernel, *args, **kwargs):
-        names.add(f"{kernel.module.name.rpartition('.')[2]}.{kernel.key.rpartition('.')[2]}")
+        names.add(title(kernel))
         return launch(kernel, *args, **kwargs)
 
     with mock.patch.object(wp, "launch", noted):
@@ -265,7 +270,7 @@ def launched() -> Iterator[set[str]]:
 def kernels() -> set[str]:
     """All that there are, but for those that draw pictures."""
     return {
-        f"{name.rpartition('.')[2]}.{kernel.key.rpartition('.')[2]}"
+        title(kernel)
         for name, module in list(sys.modules.items())
         if name.startswith("warp_contact.kernels.")
         for kernel in vars(module).values()

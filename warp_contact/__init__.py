@@ -1,14 +1,14 @@
 """Contact between deformable bodies by contact surfaces, on NVIDIA Warp."""
 
 from warp_contact.errors import SimulationError
-from warp_contact.materials import Corotated, NeoHookean, SpringNetwork
-from warp_contact.measure import Measure
-from warp_contact.mesh import MeshError, TetMesh
-from warp_contact.response import ContactSurface, Penalty, PredictedForce
-from warp_contact.scene import Body, Scene
-from warp_contact.shapes import box, cylinder, dish, sphere
+from warp_contact.measure.measure import Measure
+from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork
+from warp_contact.scene.mesh import MeshError, TetMesh
+from warp_contact.scene.scene import Body, Scene
+from warp_contact.scene.shapes import box, cylinder, dish, sphere
 from warp_contact.simulation import Simulation
-from warp_contact.usd import UsdWriter
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.usd.writer import UsdWriter
 
 __all__ = [
     "Body",

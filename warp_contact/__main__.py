@@ -2,6 +2,6 @@
 
 import sys
 
-from warp_contact.cli import main
+from warp_contact.command.cli import main
 
 sys.exit(main())

@@ -7,15 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 import warp as wp
 
-from warp_contact import checkpoint
-from warp_contact.assemble import assemble
-from warp_contact.fields import contact_fields
-from warp_contact.measure import Measure, Meter
+from warp_contact.frame import checkpoint
+from warp_contact.frame.load_kernels import load_kernels
+from warp_contact.frame.stepper import Stepper
+from warp_contact.measure.contact_fields import contact_fields
+from warp_contact.measure.measure import Measure, Meter
 from warp_contact.progress import Progress
-from warp_contact.ready import load_kernels
-from warp_contact.response import ContactSurface, Penalty, PredictedForce
-from warp_contact.scene import Body, Scene, vertex_ids
-from warp_contact.stepper import Stepper
+from warp_contact.scene.assemble import assemble
+from warp_contact.scene.scene import Body, Scene, vertex_ids
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 
 class Simulation:

@@ -13,8 +13,8 @@ from verification import weight as static
 from verification.setup import Ask, Pose
 
 import warp_contact as wc
-from warp_contact import impulse
-from warp_contact.kernels import impulse as impulse_kernels
+from warp_contact.kernels.impulse import impulse as impulse_kernels
+from warp_contact.step import impulse
 
 INSERTED = "energy that it puts in [J]"
 RISE = "energy gained [of that stored]"

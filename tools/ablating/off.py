@@ -8,8 +8,9 @@ from unittest import mock
 
 import warp as wp
 
-from warp_contact import candidates, depth, forces, impulse, solver, substeps, surface
-from warp_contact.kernels import impulse as impulse_kernels
+from warp_contact.frame import step_bounds
+from warp_contact.kernels.impulse import impulse as impulse_kernels
+from warp_contact.step import broad_phase, depth, forces, impulse, step, surface
 
 
 def without(owner, attribute: str, new) -> Callable:
@@ -42,7 +43,7 @@ def constant(owner: ModuleType, name: str, value, *users: ModuleType) -> Callabl
 
 def without_repeats():
     """A context in which the stable step of the start of a frame is that of its end too."""
-    return mock.patch.object(substeps, "UNSTABLE", math.inf)
+    return mock.patch.object(step_bounds, "UNSTABLE", math.inf)
 
 
 def nothing(*args) -> None:
@@ -54,20 +55,20 @@ def no_crossings(model, x0, x, work, fresh, hold=False) -> None:
     work.n_crossing.zero_()
 
 
-def by_mass(model, state, work, response, search, move=solver.move_surfaces) -> None:
+def by_mass(model, state, work, response, search, move=step.move_surfaces) -> None:
     """In the place of ``solver.move_surfaces``: deep overlaps are left to the closure too."""
     move(model, state, work, response, False)
 
 
-def blind(model, state, work, response, search, move=solver.move_surfaces) -> None:
+def blind(model, state, work, response, search, move=step.move_surfaces) -> None:
     """In the place of ``solver.move_surfaces``: what the closure moved is not looked at."""
-    with mock.patch.object(solver, "contacts", nothing):
+    with mock.patch.object(step, "contacts", nothing):
         move(model, state, work, response, search)
 
 
-def unseen(model, state, work, response, search, move=solver.move_surfaces) -> None:
+def unseen(model, state, work, response, search, move=step.move_surfaces) -> None:
     """In the place of ``solver.move_surfaces``: after the closure it looks at edges alone."""
-    with mock.patch.object(solver, "vertex_contacts", nothing):
+    with mock.patch.object(step, "vertex_contacts", nothing):
         move(model, state, work, response, search)
 
 
@@ -133,15 +134,15 @@ def plain(kernel, *args, launch=wp.launch, **kwargs) -> None:
 
 def damp_last(model, state, work, stages) -> None:
     """In the place of ``solver.predict``: the forces first."""
-    solver.kick(model, state, work)
+    step.kick(model, state, work)
     if stages > 0:
         scratch = work.v, work.s
         given = work.dt, work.f_tet, scratch, stages, work.share
         forces.damp(model, state.x, state.v, model.inv_mass, *given)
-    solver.drift(model, state, work, work.x)
+    step.drift(model, state, work, work.x)
 
 
-def found_anew(model, x0, x1, work, refresh=candidates.refresh) -> None:
+def found_anew(model, x0, x1, work, refresh=broad_phase.refresh) -> None:
     """In the place of ``candidates.refresh``: all that was found is out of date."""
     work.candidates.x.fill_(wp.vec3(math.inf))
     refresh(model, x0, x1, work)

@@ -8,8 +8,9 @@ import warp as wp
 
 from ablating import apart, impacts, loads, off
 from ablating.off import without
-from warp_contact import candidates, depth, impulse, solver, stepper, substeps, surface
-from warp_contact.kernels import crossing, edge_contact, vertex_contact
+from warp_contact.frame import step_bounds, stepper
+from warp_contact.kernels.narrow_phase import edge_contact, edges, vertex_contact
+from warp_contact.step import broad_phase, depth, impulse, step, surface
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ FORCE = 1e-5  # of a force: float32, and a sample of some frames
 PARTS = {
     "edges": Part(
         "contacts of edges",
-        without(solver, "edge_contacts", off.no_crossings),
+        without(step, "edge_contacts", off.no_crossings),
         impacts.tilted,
         impacts.OVERLAP,
         FINEST,
@@ -52,7 +53,7 @@ PARTS = {
     ),
     "search": Part(
         "search for the surface (stage 4)",
-        without(solver, "move_surfaces", off.by_mass),
+        without(step, "move_surfaces", off.by_mass),
         loads.overlapping,
         loads.PLACE,
         1.0,
@@ -69,14 +70,14 @@ PARTS = {
     ),
     "looks": Part(
         "look after the closure",
-        without(solver, "move_surfaces", off.blind),
+        without(step, "move_surfaces", off.blind),
         impacts.fine,
         impacts.OVERLAP,
         FINEST,
     ),
     "vertices": Part(
         "of it, the look at vertices",
-        without(solver, "move_surfaces", off.unseen),
+        without(step, "move_surfaces", off.unseen),
         impacts.fine,
         impacts.OVERLAP,
         FINEST,
@@ -104,7 +105,7 @@ PARTS = {
     ),
     "deep end": Part(
         "edges led out by their deep end",
-        off.constant(edge_contact, "ASIDE", 0.0, crossing),
+        off.constant(edge_contact, "ASIDE", 0.0, edges),
         impacts.beside,
         impacts.OVERLAP,
         FINEST,
@@ -153,7 +154,7 @@ PARTS = {
     ),
     "hold": Part(
         "contacts of edges that go on",
-        without(solver, "hold_edges", off.none_held),
+        without(step, "hold_edges", off.none_held),
         impacts.balls,
         impacts.GAINED,
         GAIN,
@@ -167,28 +168,28 @@ PARTS = {
     ),
     "damping": Part(
         "damping before the forces",
-        without(solver, "predict", off.damp_last),
+        without(step, "predict", off.damp_last),
         loads.columns,
         loads.PRESSED,
         FORCE,
     ),
     "skins": Part(
         "candidates kept for many steps",
-        without(candidates, "refresh", off.found_anew),
+        without(broad_phase, "refresh", off.found_anew),
         apart.crowd,
         apart.TIME,
         0.0,
     ),
     "deep": Part(
         "shorter steps while there are overlaps from the start",
-        without(substeps, "LINGERING", substeps.TRAVEL),
+        without(step_bounds, "LINGERING", step_bounds.TRAVEL),
         loads.inserted,
         loads.RISE,
         GAIN,
     ),
     "thin": Part(
         "shorter steps for thin bodies",
-        without(substeps, "REACH", math.inf),
+        without(step_bounds, "REACH", math.inf),
         impacts.thin,
         impacts.APPROACH,
         0.01,
@@ -205,7 +206,7 @@ PARTS = {
     ),
     "steady": Part(
         "steps that hardly grow again",
-        without(substeps, "KEEP", 0.0),
+        without(step_bounds, "KEEP", 0.0),
         apart.vibrating,
         apart.DRIFT,
         1e-3,

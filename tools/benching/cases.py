@@ -9,7 +9,7 @@ import numpy as np
 
 import warp_contact as wc
 from warp_contact import scenes
-from warp_contact.scene import rotation_matrix
+from warp_contact.scene.scene import rotation_matrix
 from warp_contact.scenes import squeezed_sphere
 
 FRAMES = {  # until there are contacts; at 60 frames a second

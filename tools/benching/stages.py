@@ -12,16 +12,16 @@ from time import thread_time
 import warp as wp
 
 from benching.memory import held
-from warp_contact import candidates, impulse, solver, surface
+from warp_contact.step import broad_phase, impulse, step, surface
 
 STAGES = {  # the functions of a stage; the outermost call counts
-    "damping": ((solver, "damp"),),
-    "predict": ((solver, "kick"), (solver, "drift")),
-    "candidates": ((candidates, "refresh"),),
-    "vertex_contacts": ((solver, "vertex_contacts"),),
-    "edge_contacts": ((solver, "edge_contacts"), (solver, "hold_edges")),
+    "damping": ((step, "damp"),),
+    "predict": ((step, "kick"), (step, "drift")),
+    "candidates": ((broad_phase, "refresh"),),
+    "vertex_contacts": ((step, "vertex_contacts"),),
+    "edge_contacts": ((step, "edge_contacts"), (step, "hold_edges")),
     "impulses": (
-        (solver, "arrange"),
+        (step, "arrange"),
         (impulse, "recall"),
         (impulse, "exchange"),
         (impulse, "push"),
@@ -31,7 +31,7 @@ STAGES = {  # the functions of a stage; the outermost call counts
         (impulse, "forget_edges"),
         (impulse, "record"),
     ),
-    "closure": ((solver, "move_surfaces"), (surface, "leftover")),
+    "closure": ((step, "move_surfaces"), (surface, "leftover")),
 }
 OTHER = "other"  # outside of them all
 MEMORY = (

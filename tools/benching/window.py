@@ -11,8 +11,9 @@ import warp as wp
 
 from benching.memory import Snapshot, held
 from benching.stages import OTHER, STAGES, StageTimer
-from warp_contact import Simulation, solver
-from warp_contact.forces import share_for, stages_for
+from warp_contact import Simulation
+from warp_contact.step import step as stages
+from warp_contact.step.forces import share_for, stages_for
 
 WORK = 60_000  # vertices times steps of a window
 LEAST, MOST = 8, 64  # steps
@@ -76,7 +77,7 @@ def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
             sim._stepper.work.dt.fill_(sim._stepper.dt)
         else:
             raise RuntimeError("contacts outgrow their buffers in every window")
-        step, elastic = window.capture(solver.step), window.capture(_elastic)
+        step, elastic = window.capture(stages.step), window.capture(_elastic)
         runs = []
         for _ in range(repeats):
             runs.append((window.replay(step), window.replay(elastic), window.stages()))
@@ -111,9 +112,9 @@ def _medians(runs: Sequence[Sequence[float]]) -> list[float]:
     return [median(times) for times in zip(*runs, strict=True)]
 
 
-def _elastic(model, state, work, response, stages, search, unit) -> None:
-    solver.predict(model, state, work, stages)
-    solver.drift(model, state, work, state.x)
+def _elastic(model, state, work, response, damping_stages, search, unit) -> None:
+    stages.predict(model, state, work, damping_stages)
+    stages.drift(model, state, work, state.x)
 
 
 class _Window:
@@ -162,7 +163,7 @@ class _Window:
         self.contacts.clear()
         with StageTimer(self._device) as timer:
             for _ in range(self._steps):
-                solver.step(*self._arguments)
+                stages.step(*self._arguments)
                 self.contacts.append(int(self._work.contacts.n.numpy()[0]))
         self.operations, self.sizes = timer.operations, timer.bytes
         return timer.ms

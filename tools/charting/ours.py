@@ -9,7 +9,7 @@ import numpy as np
 import warp_contact as wc
 from charting.methods import Own
 from charting.panel import Failed, Motion, Panel, placed
-from warp_contact import solver
+from warp_contact.step import step
 
 
 def run(panel: Panel, setting: Own, substeps: int | None, limit: float) -> Motion:
@@ -17,7 +17,7 @@ def run(panel: Panel, setting: Own, substeps: int | None, limit: float) -> Motio
 
     Without surfaces the last stage of a step is left out. It is no option of the package.
     """
-    still = nullcontext() if setting.surfaces else mock.patch.object(solver, "move_surfaces")
+    still = nullcontext() if setting.surfaces else mock.patch.object(step, "move_surfaces")
     with still:
         return play(panel, setting.response(panel), substeps, limit)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 import warp_contact as wc
 from checks.table import Row
-from warp_contact.scene import rotation_matrix
+from warp_contact.scene.scene import rotation_matrix
 
 EDGE = 0.1  # of a block [m]
 YOUNG, POISSON, DENSITY = 5e4, 0.3, 1000.0  # [Pa], [-], [kg/m^3]

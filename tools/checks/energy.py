@@ -8,7 +8,7 @@ import warp as wp
 
 import warp_contact as wc
 from checks.table import Row
-from warp_contact import forces
+from warp_contact.step import forces
 
 SIZE, CELLS = (0.4, 0.1, 0.1), (8, 2, 2)  # [m], held at one end
 YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0  # [Pa], [-], [kg/m^3]

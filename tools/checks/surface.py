@@ -13,9 +13,9 @@ import numpy as np
 import warp_contact as wc
 from checks.heights import facing, height
 from checks.table import Row
-from warp_contact import candidates, solver, surface
-from warp_contact.types import Capacity
-from warp_contact.work import Work, allocate_work
+from warp_contact.data.contacts import Capacity
+from warp_contact.data.work import Work, allocate_work
+from warp_contact.step import broad_phase, step, surface
 
 EDGE = 0.1  # of a block [m]
 YOUNG, DENSITY = 5e4, 1000.0  # of the lower block [Pa], [kg/m^3]
@@ -102,13 +102,13 @@ def settle(sim: wc.Simulation, work: Work) -> int:
     work.dt.fill_(DT)
     work.bodies.rebuild()
     for call in range(CALLS):
-        candidates.refresh(model, state.x, state.x, work)
+        broad_phase.refresh(model, state.x, state.x, work)
         edges = sim.response.search == "balanced"
-        solver.contacts(model, state.x, state.x, work, fresh=False, edges=edges)
+        step.contacts(model, state.x, state.x, work, fresh=False, edges=edges)
         surface.leftover(model, state.x, work)
         if not work.found.numpy()[0]:
             return call
-        solver.move_surfaces(model, state, work, sim.response, search=True)
+        step.move_surfaces(model, state, work, sim.response, search=True)
     return CALLS
 
 
@@ -127,5 +127,5 @@ def first_speed(scene: wc.Scene, search: str) -> float:
     work = allocate_work(sim.model, sim.state, ROOM)
     work.dt.fill_(DT)
     work.bodies.rebuild()
-    solver.step(sim.model, sim.state, work, sim.response, stages=0, search=True, unit=1.0)
+    step.step(sim.model, sim.state, work, sim.response, stages=0, search=True, unit=1.0)
     return float(np.linalg.norm(sim.velocities(), axis=1).max())

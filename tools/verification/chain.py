@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import warp_contact as wc
-from warp_contact.scene import Body
+from warp_contact.scene.scene import Body
 
 
 @dataclass

@@ -18,7 +18,7 @@ from verification.figure import Figure, relative, zero
 from verification.relax import relax, step_rate
 from verification.setup import Ask, Pose
 from verification.weight import vertex_areas
-from warp_contact import shapes
+from warp_contact.scene import shapes
 
 RADIUS, YOUNG, POISSON, DENSITY = 0.1, 1e6, 0.3, 1000.0  # [m], [Pa], [-], [kg/m^3]
 WIDTH, HEIGHT = 0.045, 0.06  # of the part of the ball [m]

@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 import warp_contact as wc
-from warp_contact import forces
+from warp_contact.step import forces
 
 ZETA = 0.7  # of the slowest mode: the fastest decay without a long tail
 

@@ -10,7 +10,7 @@ import numpy as np
 from checks.collision import ANGLES, quaternion
 
 import warp_contact as wc
-from warp_contact.scene import rotation_matrix
+from warp_contact.scene.scene import rotation_matrix
 
 G = 9.81  # [m/s^2]
 MESHES = "structured", "mirrored", "jittered"

@@ -6,7 +6,7 @@ Poisson ratio of 0 a bar stretched by s carries P = E (s - 1) exactly.
 
 import numpy as np
 
-from warp_contact.scene import Body
+from warp_contact.scene.scene import Body
 
 
 def first_piola(body: Body, x: np.ndarray) -> np.ndarray:

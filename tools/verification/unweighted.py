@@ -17,7 +17,7 @@ from unittest.mock import patch
 
 import warp as wp
 
-from warp_contact import depth
+from warp_contact.step import depth
 
 wp.set_module_options({"enable_backward": False})
 

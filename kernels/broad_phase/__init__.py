@@ -1,0 +1,1 @@
+"""Which vertices and edges may come to touch which bodies, for some steps."""

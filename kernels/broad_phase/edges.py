@@ -1,0 +1,111 @@
+"""Edges and triangles that may come to cross: no axis separates them by more than both skins.
+
+Threads append what they find to a list in any order; pairs.py sorts it.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.broad_phase.bounds import next_in
+from warp_contact.kernels.broad_phase.near import MANY, Near, is_near, part, reaches
+from warp_contact.kernels.broad_phase.pairs import append
+from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
+
+
+@wp.func
+def gap_along(
+    axis: wp.vec3, p: wp.vec3, q: wp.vec3, b: wp.vec3, c: wp.vec3
+) -> float:  # relative to corner a of the triangle
+    """Gap between pq and the triangle 0bc along an axis, not above 0 where they overlap."""
+    size = wp.length(axis)
+    if size == 0.0:
+        return 0.0
+    sp = wp.dot(axis, p)
+    sq = wp.dot(axis, q)
+    sb = wp.dot(axis, b)
+    sc = wp.dot(axis, c)
+    lo = wp.min(wp.min(sb, sc), 0.0)
+    hi = wp.max(wp.max(sb, sc), 0.0)
+    return wp.max(wp.min(sp, sq) - hi, lo - wp.max(sp, sq)) / size
+
+
+@wp.func
+def gap_to(p: wp.vec3, q: wp.vec3, t: wp.vec3i, enough: float, x: wp.array[wp.vec3]) -> float:
+    """Gap [m] of pq to triangle t along an axis of the separating axis theorem.
+
+    Along the first axis with enough, else the largest: a distance that they keep.
+    """
+    a = x[t[0]]
+    u = p - a
+    v = q - a
+    b = x[t[1]] - a
+    c = x[t[2]] - a
+    d = q - p
+    n = wp.cross(b, c)
+    gap = gap_along(n, u, v, b, c)
+    if gap <= enough:
+        gap = wp.max(gap, gap_along(wp.cross(n, d), u, v, b, c))
+    e = b
+    for k in range(3):
+        if k == 1:
+            e = c
+        if k == 2:
+            e = c - b
+        if gap <= enough:
+            gap = wp.max(gap, gap_along(wp.cross(d, e), u, v, b, c))
+        if gap <= enough:
+            gap = wp.max(gap, gap_along(wp.cross(n, e), u, v, b, c))
+    return gap
+
+
+@wp.kernel
+def visit_edges(
+    # in
+    skin: wp.array[float],  # (n_body,) [m]
+    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    edges: wp.array[wp.vec4i],  # (n_edge,)
+    vert_body: wp.array[int],  # (n_vert,)
+    of: Near,
+    near_tri: wp.array[int],  # (capacity,) of near.py
+    lower: wp.array[wp.vec3],  # (n_tri,) boxes of the triangles [m]
+    upper: wp.array[wp.vec3],  # (n_tri,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    found: wp.array[wp.vec2i],  # (capacity,) edge and triangle
+    # out, added to
+    n_found: wp.array[int],  # (1,)
+):
+    """One thread per surface edge: the triangles that it may come to cross."""
+    e = wp.tid()
+    m = vert_body[edges[e][0]]
+    if of.n_near[m] == 0:
+        return
+    p = x[edges[e][0]]
+    q = x[edges[e][1]]
+    own = part(p, p, q, q, skin[m])
+    if of.n_near[m] <= MANY:
+        for k in range(of.n_near[m]):
+            reach = skin[m] + skin[of.near[m, k]]
+            if reaches(own, of.slab[m, k]):
+                if boxes_meet(own.lo, own.hi, of.tri_lower[m, k], of.tri_upper[m, k]):
+                    for c in range(of.tris[m, k][0], of.tris[m, k][1]):
+                        t = near_tri[c]
+                        if boxes_meet(own.lo, own.hi, lower[t], upper[t]):
+                            if gap_to(p, q, tris[t], reach, x) <= reach:
+                                append(e, t, found, n_found)
+    else:
+        world = of.world[m]
+        body = next_in(of.bodies, world, own.lo, own.hi, -1)
+        while body >= 0:
+            if is_near(m, body, own, of):
+                reach = skin[m] + skin[body]
+                t = int(0)
+                root = wp.bvh_get_group_root(surface, body)
+                query = wp.bvh_query_aabb(surface, own.lo, own.hi, root)
+                while wp.bvh_query_next(query, t):
+                    if gap_to(p, q, tris[t], reach, x) <= reach:
+                        append(e, t, found, n_found)
+            body = next_in(of.bodies, world, own.lo, own.hi, body)

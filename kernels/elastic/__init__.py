@@ -1,0 +1,1 @@
+"""Elastic and damping forces of tets, one file for each material model."""

@@ -1,0 +1,1 @@
+"""Impulses and friction between bodies, and the forces of other responses."""

@@ -1,0 +1,1 @@
+"""Time stepping of vertices, the modes that limit the step, and who sleeps."""

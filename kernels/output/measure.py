@@ -1,0 +1,116 @@
+"""What is left of an overlap, found without the hash and the depths of the step.
+
+A vertex overlaps by its distance to the surface of the body whose tets hold it, an edge with both
+ends outside by the distance of the middle of its inner piece to that surface.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.broad_phase.bounds import next_in
+from warp_contact.kernels.geometry import tet_weights
+from warp_contact.kernels.narrow_phase.surface_query import closest_hit, first_crossing, inner_side
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
+
+
+@wp.kernel
+def tet_boxes(
+    # in
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    lower: wp.array[wp.vec3],  # (n_tet,) [m]
+    upper: wp.array[wp.vec3],  # (n_tet,) [m]
+):
+    """One thread per tet."""
+    q = wp.tid()
+    a = x[tets[q][0]]
+    b = x[tets[q][1]]
+    c = x[tets[q][2]]
+    d = x[tets[q][3]]
+    lower[q] = wp.min(wp.min(a, b), wp.min(c, d))
+    upper[q] = wp.max(wp.max(a, b), wp.max(c, d))
+
+
+@wp.kernel
+def vertex_overlaps(
+    # in
+    volumes: wp.uint64,  # Bvh over the tets, grouped by world
+    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    surf: wp.array[int],  # (n_surf,)
+    tets: wp.array[wp.vec4i],  # (n_tet,)
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    vert_body: wp.array[int],  # (n_vert,)
+    body_world: wp.array[int],  # (n_body,)
+    body_edge: wp.array[float],  # (n_body,) [m]
+    plane_n: wp.array[wp.vec3],  # (n_plane,)
+    plane_h: wp.array[float],  # (n_plane,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    overlap: wp.array[float],  # (n_surf,) [m]
+    partner: wp.array[int],  # (n_surf,) body, n_body + p for plane p, -1 for none
+):
+    """One thread per surface vertex: its deepest overlap."""
+    k = wp.tid()
+    i = surf[k]
+    p = x[i]
+    overlap[k] = 0.0
+    partner[k] = -1
+    for m in range(plane_n.shape[0]):
+        d = plane_h[m] - wp.dot(plane_n[m], p)
+        if d > overlap[k]:
+            overlap[k] = d
+            partner[k] = body_edge.shape[0] + m
+    world = body_world[vert_body[i]]
+    q = next_in(volumes, world, p, p, -1)
+    while q >= 0:
+        t = tets[q]
+        body = vert_body[t[0]]
+        if (
+            body != vert_body[i]
+            and wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0
+        ):
+            root = wp.bvh_get_group_root(surface, body)
+            hit = closest_hit(surface, root, tris, x, p, 0.1 * body_edge[body])
+            if hit.t > overlap[k]:
+                overlap[k] = hit.t
+                partner[k] = body
+        q = next_in(volumes, world, p, p, q)
+
+
+@wp.kernel
+def edge_overlaps(
+    # in
+    bodies: wp.uint64,  # Bvh over the bodies, grouped by world
+    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    tris: wp.array[wp.vec3i],  # (n_tri,)
+    edges: wp.array[wp.vec4i],  # (n_edge,)
+    vert_body: wp.array[int],  # (n_vert,)
+    body_world: wp.array[int],  # (n_body,)
+    body_edge: wp.array[float],  # (n_body,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    overlap: wp.array[float],  # (n_edge,) [m]
+    partner: wp.array[int],  # (n_edge,) body, -1 for none
+):
+    """One thread per surface edge: the deepest middle of an inner piece."""
+    e = wp.tid()
+    p = x[edges[e][0]]
+    q = x[edges[e][1]]
+    own = vert_body[edges[e][0]]
+    overlap[e] = 0.0
+    partner[e] = -1
+    world = body_world[own]
+    body = next_in(bodies, world, wp.min(p, q), wp.max(p, q), -1)
+    while body >= 0:
+        if body != own:
+            root = wp.bvh_get_group_root(surface, body)
+            piece = first_crossing(surface, root, tris, x, p, q - p)
+            if piece.enter.tri >= 0 and piece.leave.tri >= 0:
+                middle = p + 0.5 * (piece.enter.t + piece.leave.t) * (q - p)
+                hit = closest_hit(surface, root, tris, x, middle, 0.1 * body_edge[body])
+                if hit.t > overlap[e] and inner_side(hit, tris, x, middle) > 0.0:
+                    overlap[e] = hit.t
+                    partner[e] = body
+        body = next_in(bodies, world, wp.min(p, q), wp.max(p, q), body)

@@ -1,0 +1,1 @@
+"""The contact surface: eq. (1), the search for equal pressures, the closure."""

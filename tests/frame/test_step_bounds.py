@@ -1,0 +1,106 @@
+"""step_bounds.py: the number of steps in a frame, and what makes a frame be repeated."""
+
+import math
+
+import numpy as np
+import pytest
+
+from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box
+from warp_contact.frame import step_bounds
+from warp_contact.step.forces import MARGIN
+
+OMEGA = 1000.0  # [1/s]
+STABLE = OMEGA / (2.0 * step_bounds.SAFETY)  # steps [1/s] of a body that does not move
+THICKNESS, EDGE = 0.1, 0.02  # [m]
+
+
+def steps(speed: float, thickness: float = THICKNESS, overlaps: bool = False) -> float:
+    return step_bounds.steps_per_second(OMEGA, speed, thickness, EDGE, overlaps)
+
+
+def test_each_limit_sets_the_steps_where_it_is_the_tightest():
+    assert steps(0.0) == STABLE
+    for travel, overlaps in ((step_bounds.TRAVEL, False), (step_bounds.LINGERING, True)):
+        fast = 1.5 * STABLE * travel * EDGE
+        assert steps(fast, overlaps=overlaps) == pytest.approx(1.5 * STABLE)
+        assert steps(2.0 * fast, overlaps=overlaps) == step_bounds.PATIENCE * STABLE
+    assert steps(fast, thickness=1e-4) == pytest.approx(fast / (step_bounds.REACH * 1e-4))
+
+
+def test_more_speed_never_takes_fewer_steps():
+    wanted = [steps(0.01 * 2.0**k) for k in range(20)]
+    assert wanted == sorted(wanted)
+    assert steps(0.02 * 2.0**20) == pytest.approx(2.0 * steps(0.01 * 2.0**20))
+
+
+def test_a_frame_has_a_step_and_hardly_fewer_than_the_last():
+    assert step_bounds.steps_in_frame(0.0, 60.0, 0) == 1
+    assert step_bounds.steps_in_frame(601.0, 60.0, 0) == 11
+    assert step_bounds.steps_in_frame(601.0, 60.0, 100) == int(100 * step_bounds.KEEP)
+    assert step_bounds.steps_in_frame(60.0 * 200, 60.0, 100) == 200
+
+
+def test_a_penalty_adds_the_highest_frequency_of_masses_that_it_joins_in_a_row():
+    stiffness, mass = 500.0, 1e-3
+    shift = np.roll(np.eye(8), 1, axis=0)
+    ring = stiffness / mass * (2.0 * np.eye(8) - shift - shift.T)
+    highest = math.sqrt(np.linalg.eigvalsh(ring)[-1])
+    assert step_bounds.with_penalty(0.0, stiffness, 1.0 / mass) == pytest.approx(highest)
+    assert step_bounds.with_penalty(OMEGA, stiffness, 0.0) == OMEGA
+
+
+# h times the rate of the damping, and the p that is reckoned with: 1 without it, else 0, and in two
+# stages that count by more than 2/3 what is less.
+@pytest.mark.parametrize(("z", "least"), [(0.0, 1.0), (0.9, 0.0), (1.5, 0.0), (3.8, -0.1)])
+def test_a_step_is_refused_before_it_is_unstable(z, least):
+    exact = math.sqrt(2.0 * (1.0 + least))  # of h omega, for Euler
+
+    def stable(part: float, omega: float = OMEGA) -> bool:
+        dt = part * exact / OMEGA
+        return step_bounds.stays_stable(dt, omega, z / dt)
+
+    assert not stable(0.9999) and stable(0.97)
+    assert not stable(1e-3, math.inf) and not stable(1e-3, math.nan)
+
+
+def test_a_frame_is_repeated_with_a_higher_frequency_but_not_that_of_an_explosion():
+    dt, most = 1.2 / 100.0, step_bounds.EXPLODED
+    assert step_bounds.raised((100.0, 90.0), (50.0, 3.0), dt) == (100.0 * step_bounds.RAISED, 90.0)
+    assert step_bounds.raised((100.0, 90.0), (50.0, 3.0), dt, 2.0) == (200.0, 90.0)
+    assert step_bounds.raised((100.0, 90.0), (250.0, 99.0), dt) == (250.0, 99.0)
+    assert step_bounds.raised((100.0, 90.0), (1e9, 1e9), dt) == (100.0 * most, 90.0 * most**2)
+    # A step that was shorter than the frequency asked for, without damping at the start.
+    assert step_bounds.raised((1.0, 0.0), (1e9, 1e9), dt) == pytest.approx(
+        (100.0 * most, most**2 / dt)
+    )
+
+
+def test_a_frame_keeps_its_stages_until_the_margin_of_the_damping_is_used_up():
+    dt = 1e-3
+    rate = 4.0 / (MARGIN * dt)  # two stages, whose share is chosen for 4
+    assert step_bounds.stays_damped(dt, rate, 0.999 * MARGIN * rate)
+    assert not step_bounds.stays_damped(dt, rate, 1.001 * MARGIN * rate)
+    assert step_bounds.stays_damped(dt, 0.0, 0.0)
+
+
+def test_a_step_that_the_user_chose_is_refused_where_it_is_unstable_or_jumps_through():
+    def fault(dt, speed):
+        return step_bounds.fault(dt, OMEGA, speed, THICKNESS)
+
+    stable, still, fast = 2.0 / OMEGA, 0.0, step_bounds.LEAP * THICKNESS * OMEGA
+    assert "unstable" in fault(1.06 * stable, still) and not fault(1.04 * stable, still)
+    assert "thinnest body" in fault(1.01 / OMEGA, fast) and not fault(0.99 / OMEGA, fast)
+
+
+def test_bodies_of_other_worlds_are_not_fast_against_each_other():
+    def sim(*worlds):
+        scene = Scene(gravity=(0.0, 0.0, 0.0))
+        for k, world in enumerate(worlds):
+            v = (20.0 * (-1.0) ** k, 0.0, 0.0)
+            rubber = NeoHookean(1e5, 0.3, 1000.0)
+            scene.add_body(box(0.05, 3), rubber, (k, 0.0, 0.0), velocity=v, world=world)
+        return Simulation(scene, substeps=64)
+
+    sim(0, 1).step_frame()
+    with pytest.raises(SimulationError, match=r"substeps=64 is too few: bodies move 0\.0104 m"):
+        sim(0, 0).step_frame()

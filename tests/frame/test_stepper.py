@@ -1,0 +1,165 @@
+"""stepper.py: frames that are repeated, and looks at the step within those with flat tets."""
+
+import numpy as np
+import pytest
+
+from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box
+from warp_contact.frame import stepper
+
+DRY = NeoHookean(1e5, 0.3, 1000.0)  # without damping
+
+
+def let_go(size: float, **options) -> Simulation:
+    """A free block at ``size`` of its lengths, before its first frame."""
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    mesh = box(0.1, 2)
+    scene.add_body(mesh, DRY)
+    sim = Simulation(scene, fps=200, **options)
+    sim.set_positions(0, size * mesh.vertices)
+    return sim
+
+
+@pytest.fixture
+def looks(monkeypatch):
+    """A frame of a run, looked at every ``part`` steps: what was found.
+
+    What the second look finds, the first after the start, goes through ``second``.
+    """
+
+    def step(sim: Simulation, part: int, second=lambda found: found) -> list:
+        rates, found = sim._stepper.spectrum.rates, []
+
+        def look(x):
+            found.append(rates(x))
+            return second(found[-1]) if len(found) == 2 else found[-1]
+
+        with monkeypatch.context() as patch:
+            patch.setattr(sim._stepper.spectrum, "rates", look)
+            patch.setattr(stepper, "PART", part)
+            sim.step_frame()
+        return found
+
+    return step
+
+
+def held(material: NeoHookean, fps: float) -> tuple[Simulation, np.ndarray]:
+    """A block of edge 0.1 held at two faces, body 0, and the vertices of the upper one."""
+    mesh = box(0.1, 3)
+    z = mesh.vertices[:, 2]
+    top, low = np.flatnonzero(z > 0.049), np.flatnonzero(z < -0.049)
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    scene.add_body(mesh, material, fixed=np.r_[top, low])
+    return Simulation(scene, fps=fps), top
+
+
+def pressed(damping: float) -> Simulation:
+    """A block that was driven from three tenths of its height to a twentieth in its first frame."""
+    sim, top = held(NeoHookean(1e6, 0.45, 1000.0, damping), 60.0)
+    sim.set_positions(0, sim.positions(0) * [1.0, 1.0, 0.3])
+    sim.set_velocity(0, (0.0, 0.0, -0.025 * sim.fps), top)
+    sim.step_frame()
+    sim.set_velocity(0, (0.0, 0.0, 0.0), top)
+    return sim
+
+
+def test_a_frame_that_blows_up_is_tried_again_with_shorter_steps(monkeypatch):
+    def pull() -> Simulation:  # to three lengths in one frame, stiffer than its start tells
+        sim, top = held(NeoHookean(1e6, 0.45, 1000.0), 1.0)
+        sim.set_velocity(0, (0.0, 0.0, 0.2), top)
+        sim.step_frame()
+        return sim
+
+    sim = pull()
+    assert np.isfinite(sim.positions()).all() and sim.measure().volume_ratio > 0.0
+    monkeypatch.setattr(stepper, "HALVED", 0)
+    with pytest.raises(SimulationError, match=r"body0', vertex \d+ is no longer"):
+        pull()
+
+
+@pytest.mark.parametrize("times", [1, 4])
+def test_so_is_one_whose_end_has_no_finite_stiffness(monkeypatch, times):
+    sim, other = let_go(0.9), let_go(0.9)
+    sim.step_frame()
+    for _ in other.frames(2):
+        pass
+    ends = [(np.inf, np.inf)] * times
+    rates = sim._stepper.spectrum.rates
+    monkeypatch.setattr(sim._stepper.spectrum, "rates", lambda x: ends.pop() if ends else rates(x))
+    if times > stepper.HALVED:
+        with pytest.raises(SimulationError, match=r"frame 2: stiffness .* flattest is body 'bo"):
+            sim.step_frame()
+        assert sim.frame == 1
+        return
+    sim.step_frame()
+    # Twice the rates, to a whole number of steps.
+    assert 2 * other.substeps - 1 <= sim.substeps <= 2 * other.substeps
+
+
+def test_looks_within_a_frame_change_nothing_where_its_steps_do(looks):
+    often, once = let_go(0.5), let_go(0.5)
+    found = looks(often, 3)
+    assert len(found) == 1 + -(-often.substeps // 3) > 2
+    assert len(looks(once, 1000)) == 2  # the start and the end
+    np.testing.assert_array_equal(often.positions(), once.positions())
+    np.testing.assert_array_equal(often.velocities(), once.velocities())
+
+
+def test_there_are_none_where_no_tet_is_flat_or_the_steps_are_fixed(looks):
+    assert len(looks(let_go(0.7), 3)) == 2
+    assert len(looks(let_go(0.5, substeps=20), 3)) == 2
+
+
+def test_a_frame_that_ends_flat_is_done_again_with_looks(looks):
+    sim = let_go(0.7)
+    sim.set_velocity(0, -100.0 * sim.positions(0))  # within a frame to about half of its lengths
+    found = looks(sim, 1)
+    assert sim._stepper.spectrum.flat
+    assert len(found) >= 2 + sim.substeps
+
+
+def test_a_step_that_is_too_long_within_a_frame_cuts_it_short_and_repeats_it(looks):
+    sim = let_go(0.5)
+    found = looks(sim, 3, lambda found: (1e9, found[1]))
+    assert len(found) == 2 + -(-sim.substeps // 3)  # the start, the one too long, the repeat
+    usual, same = let_go(0.5), let_go(0.5, substeps=sim.substeps)
+    usual.step_frame()
+    same.step_frame()
+    assert sim.substeps > 2 * usual.substeps
+    np.testing.assert_array_equal(sim.positions(), same.positions())
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-3])
+def test_a_block_is_pressed_flat_within_a_frame(damping):
+    sim = pressed(damping)
+    assert 0.0 < sim.measure().volume_ratio < 0.05  # J of its mean is 0.05
+    assert sim.substeps < 10_000  # some 900 to 2000; those of an exploded state were 266 469
+
+
+def test_a_run_with_flat_tets_goes_on_from_its_checkpoint_with_the_same_bits(tmp_path):
+    through = pressed(0.0)  # it goes on to vibrate: every look finds other rates
+    through.save(tmp_path / "flat")
+    later, _ = held(NeoHookean(1e6, 0.45, 1000.0), 60.0)
+    later.load(tmp_path / "flat")
+    for sim in (through, later):
+        for _ in sim.frames(2):
+            assert sim._stepper.spectrum.flat
+    np.testing.assert_array_equal(through.positions(), later.positions())
+    np.testing.assert_array_equal(through.velocities(), later.velocities())
+    assert through._stepper.rates == later._stepper.rates
+
+
+def test_buffers_outgrown_within_a_frame_end_it_at_once(looks, monkeypatch):
+    sim, calm = let_go(0.5), let_go(0.5)
+    expected = looks(calm, 3)
+    enlarged, asked = stepper.enlarged, []
+
+    def outgrown(work):
+        asked.append(len(asked))
+        if len(asked) == 2:  # first after the look for overlaps at the start, then after a part
+            work.contacts.needed.fill_(work.capacity.contacts + 1)
+        return enlarged(work)
+
+    monkeypatch.setattr(stepper, "enlarged", outgrown)
+    assert looks(sim, 3) == expected  # no more: not one at what the outgrown buffers left
+    assert sim._stepper.work.capacity.contacts > calm._stepper.work.capacity.contacts
+    np.testing.assert_array_equal(sim.positions(), calm.positions())

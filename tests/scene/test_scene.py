@@ -1,0 +1,94 @@
+"""scene.py and response.py: what they take, and what they refuse with a reason."""
+
+import numpy as np
+import pytest
+
+from warp_contact import ContactSurface, NeoHookean, Penalty, Scene, box
+from warp_contact.scene.scene import rotation_matrix
+
+RUBBER = NeoHookean(1e5, 0.3, 1000.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"friction": -0.1}, "friction -0.1 is negative"),
+        ({"friction": float("nan")}, "friction nan is not finite"),
+        ({"gravity": (0.0, 1.0)}, "gravity .* is not finite or not of shape"),
+        ({"gravity": "down"}, "gravity 'down' is not a number"),
+    ],
+)
+def test_a_scene_refuses_what_is_no_physics(options, message):
+    with pytest.raises(ValueError, match=message):
+        Scene(**options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"fixed": [0, 8]}, "body 'cube': fixed names vertex 8 of 8"),
+        ({"fixed": [-1]}, "body 'cube': fixed names vertex -1 of 8"),
+        ({"fixed": np.zeros(7, dtype=bool)}, r"fixed has shape \(7,\), there are 8"),
+        ({"fixed": [0.5]}, "fixed: neither a mask nor vertex ids"),
+        ({"label": "floor"}, "body 'floor': another body has this label"),
+        ({"label": "plane0"}, "body 'plane0': this is how a half-space is called"),
+        ({"rotation": (0, 0, 0, 0)}, "body 'cube': rotation is a zero quaternion"),
+        ({"position": (0, 0, np.nan)}, "body 'cube': position .* is not finite"),
+        ({"velocity": np.zeros((7, 3))}, r"body 'cube': velocity [\s\S]* not of shape"),
+        ({"world": -1}, "body 'cube': world -1 is not a count"),
+        ({"world": None}, "body 'cube': world None is not a count"),
+        ({"mesh": "bunny"}, "body 'cube': mesh is a str, not a TetMesh"),
+        ({"material": NeoHookean(-1.0, 0.3, 1.0)}, "body 'cube': youngs_modulus must be positive"),
+        (
+            {"material": NeoHookean("soft", 0.3, 1.0)},
+            "'cube': youngs_modulus 'soft' is not a number",
+        ),
+    ],
+)
+def test_a_body_is_refused_by_its_name(options, message):
+    scene = Scene()
+    scene.add_body(box(1.0, 1), RUBBER, label="floor")
+    given = {"mesh": box(1.0, 1), "material": RUBBER, "label": "cube", **options}
+    with pytest.raises(ValueError, match=message):
+        scene.add_body(**given)
+    assert len(scene.bodies) == 1
+
+
+def test_a_body_is_turned_then_moved(rng, turned):
+    q, place, v = turned(), rng.normal(size=3), rng.normal(size=3)
+    mesh = box((1.0, 2.0, 3.0), 1)
+    body = Scene().add_body(mesh, RUBBER, place, 3.0 * q, velocity=v, fixed=[1])
+    r = rotation_matrix(q)
+    # float64 rounding.
+    np.testing.assert_allclose(r @ r.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(r) == pytest.approx(1.0)
+    np.testing.assert_allclose(body.x, mesh.vertices @ r.T + place, atol=1e-14)
+    np.testing.assert_array_equal(body.v, [v] * 8)
+    np.testing.assert_array_equal(np.flatnonzero(body.fixed), [1])
+    axis, half = np.array([0.0, 0.0, 1.0]), np.pi / 4.0
+    quarter = rotation_matrix([*(np.sin(half) * axis), np.cos(half)])
+    np.testing.assert_allclose(quarter @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-15)
+
+
+def test_a_plane_is_normalised_but_its_offset_is_a_length():
+    scene = Scene()
+    scene.add_plane((0.0, 0.0, 4.0), 0.5)
+    normal, offset = scene.planes[0]
+    np.testing.assert_array_equal(normal, [0.0, 0.0, 1.0])
+    assert offset == 0.5
+    with pytest.raises(ValueError, match="plane normal is zero"):
+        scene.add_plane((0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("response", "options"),
+    [
+        (ContactSurface, {"search": "binary"}),
+        (ContactSurface, {"iterations": 0}),
+        (Penalty, {"stiffness": 0.0}),
+        (Penalty, {"stiffness": 1.0, "damping": -1.0}),
+    ],
+)
+def test_a_response_without_sense_is_refused(response, options):
+    with pytest.raises(ValueError, match=r"neither|not a |not positive|negative"):
+        response(**options)

@@ -1,0 +1,179 @@
+"""persistent.py: contacts of edges that go on from step to step, and across frames."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warp_contact import NeoHookean, Scene, Simulation, box
+from warp_contact.frame import stepper
+from warp_contact.step import impulse, step
+
+RUBBER = NeoHookean(1e5, 0.3, 1000.0, damping=2e-3)
+WEIGHT = 0.4 * 0.1 * 0.1 * 1000.0 * 9.81  # of a beam [N]
+SIN, COS = np.sin(np.pi / 8.0), np.cos(np.pi / 8.0)  # a turn by 45 degrees
+PLACED = 1.0 / np.sqrt(2.0) * 0.1 + 1e-5  # half a diagonal of a beam, and a hair
+
+
+@pytest.fixture
+def lying(device) -> Simulation:
+    """A beam across another, which is held, both on an edge: no vertex is near the contact."""
+    scene = Scene(friction=0.0)
+    for k, size in enumerate(((0.4, 0.1, 0.1), (0.1, 0.4, 0.1))):
+        q = [0.0, 0.0, 0.0, COS]
+        q[k] = SIN  # about its own length
+        cells = [3 if s > 0.1 else 1 for s in size]
+        place = 0.01 * k, 0.007 * k, 2.0 * PLACED * k
+        scene.add_body(box(size, cells), RUBBER, place, q, fixed=None if k else True)
+    sim = Simulation(scene, device=str(device))
+    for _ in sim.frames(10):
+        pass
+    assert sim._stepper.work.n_hit.numpy()[0] == 0
+    return sim
+
+
+def kept(sim: Simulation) -> np.ndarray:
+    """The contacts of edges that the last step leaves to the next."""
+    warm = sim._stepper.work.warm
+    return warm.held.numpy()[: warm.n_held.numpy()[0]]
+
+
+def go_on(sim: Simulation) -> dict[str, np.ndarray]:
+    """Begin a step: the records of the contacts that are held, and what they start from."""
+    model, x, work = sim.model, sim.state.x, sim._stepper.work
+    step.vertex_contacts(model, x, x, work, True)
+    step.hold_edges(model, x, work, search=False)
+    step.arrange(model, x, work)
+    impulse.recall_edges(work)
+    c, n = work.contacts, int(work.contacts.n.numpy()[0])
+    return {k: getattr(c, k).numpy()[:n] for k in ("vert", "coef", "normal", "lam", "pair")}
+
+
+def test_a_contact_of_two_edges_goes_on_where_they_are_closest(lying):
+    before, now = kept(lying), go_on(lying)
+    pressed = before[before["kept"][:, 3] > 0.0]
+    assert len(now["lam"]) == len(pressed) > 0
+    np.testing.assert_array_equal(now["lam"], pressed["kept"][:, 3])
+    x = lying.positions().astype(float)
+    for vert, coef, normal in zip(now["vert"], now["coef"], now["normal"], strict=True):
+        p, q, a, b = x[vert[:4]]
+        n = np.cross(q - p, b - a)
+        n /= np.linalg.norm(n)
+        # float32, over two edges at a right angle
+        assert abs(normal @ n) == pytest.approx(1.0, abs=1e-6)
+        between = coef @ x[vert]
+        np.testing.assert_allclose(np.cross(between, n), 0.0, atol=1e-7)
+        assert 0.0 <= between @ normal < 1e-3 * 0.1  # the resting gap
+
+
+def arranged(work) -> dict[str, np.ndarray]:
+    """What the impulses see of the contacts."""
+    c, n = work.contacts, int(work.contacts.n.numpy()[0])
+    start = c.start.numpy().copy()
+    found = {k: getattr(c, k).numpy()[:n].copy() for k in ("vert", "coef", "weight", "lam")}
+    touched = np.sort(c.touched.numpy()[: c.n_touched.numpy()[0]])
+    return found | {
+        "start": start,
+        "entry": c.entry.numpy()[: start[-1]].copy(),
+        "touched": touched,
+    }
+
+
+def test_a_look_that_finds_nothing_new_leaves_the_contacts_alone(lying):
+    work, x = lying._stepper.work, lying.state.x
+    go_on(lying)
+    before = arranged(work)
+    assert (before["lam"] > 0.0).any()
+    step.edge_contacts(lying.model, x, x, work, True, hold=True)
+    assert work.n_new.numpy()[0] == 0
+    after = arranged(work)
+    for name, value in before.items():
+        np.testing.assert_array_equal(after[name], value)
+
+
+def test_contacts_may_be_arranged_more_than_once(lying):
+    work, x = lying._stepper.work, lying.state.x
+    go_on(lying)
+    step.arrange(lying.model, x, work)
+    before = arranged(work)
+    assert len(before["touched"]) == np.count_nonzero(np.diff(before["start"])) > 0
+    step.arrange(lying.model, x, work)
+    for name, value in arranged(work).items():
+        np.testing.assert_array_equal(value, before[name])
+
+
+def test_the_same_contact_carries_the_beam_from_frame_to_frame(lying):
+    forces, names = [], []
+    for _ in lying.frames(12):  # later it has rolled off the edge
+        names.append({(h["edge"], h["body"]) for h in kept(lying) if h["kept"][3] > 0.0})
+        forces.append(sum(lying.measure().forces.values()))
+    print(names, forces)
+    assert set.intersection(*names)
+    assert np.mean(forces) == pytest.approx(WEIGHT, rel=0.1)  # it still swings
+
+
+@pytest.mark.parametrize("way", [(0.0, 0.0, 0.05), (0.3, 0.0, 0.0), (0.0, 0.45, 0.0)])
+def test_what_was_moved_away_is_forgotten(lying, way):
+    upper = slice(*lying.model.body_vert.numpy()[1:3])
+    x = lying.positions()
+    x[upper] += np.float32(way)
+    lying.state.x.assign(x)
+    assert len(go_on(lying)["lam"]) == 0
+    before = lying.measure().momentum[2]
+    lying.step_frame()
+    assert lying.measure().forces == {}
+    # float32, over some tens of steps
+    assert lying.measure().momentum[2] - before == pytest.approx(-WEIGHT / lying.fps, rel=1e-4)
+    assert len(kept(lying)) == 0
+
+
+def test_without_an_impulse_a_contact_is_not_held(lying):
+    warm = lying._stepper.work.warm
+    held = warm.held.numpy()
+    held["kept"][:, 3] = 0.0
+    warm.held.assign(held)
+    assert len(go_on(lying)["lam"]) == 0
+
+
+def test_a_frame_that_is_repeated_starts_from_the_same_impulses(lying, tmp_path, monkeypatch):
+    lying.save(tmp_path / "run.npz")
+    once = Simulation(lying.scene, device=str(lying.device))
+    once.load(tmp_path / "run.npz")
+    once.step_frame()
+    results = iter((False, True))
+    monkeypatch.setattr(stepper, "stays_stable", lambda *_: next(results))
+    monkeypatch.setattr(stepper, "raised", lambda before, after: before)
+    lying.step_frame()
+    assert next(results, None) is None
+    np.testing.assert_array_equal(lying.positions(), once.positions())
+    for name in ("edge", "body", "vert", "n", "kept"):
+        np.testing.assert_array_equal(kept(lying)[name], kept(once)[name])
+
+
+def test_contacts_that_take_all_the_places_ask_for_more(lying):
+    """Those of the last step keep their places also when they are over."""
+    work = lying._stepper.work
+    warm, room = work.warm, work.capacity.contacts
+    held = warm.held.numpy()
+    held[:] = held[0]
+    held["kept"][:, 3] = 0.0
+    warm.held.assign(held)
+    warm.n_held.fill_(room)
+    ahead = lying.positions()
+    ahead[slice(*lying.model.body_vert.numpy()[1:3]), 2] -= np.float32(1e-4)
+    go_on(lying)
+    assert not work.contacts.needed.numpy().any()
+    x = wp.array(ahead, dtype=wp.vec3)
+    step.edge_contacts(lying.model, lying.state.x, x, work, True, hold=True)
+    assert work.n_crossing.numpy()[0] > 0
+    assert work.contacts.needed.numpy()[0] > room
+
+
+def test_places_are_counted_from_none_in_every_step(lying):
+    """Where no vertex is near, nobody else begins to count."""
+    work = lying._stepper.work
+    work.warm.n_held.zero_()
+    assert work.candidates.verts.n.numpy()[0] == 0
+    for _ in range(2):
+        work.n_place.fill_(77)
+        go_on(lying)
+        assert work.n_place.numpy()[0] == 0

@@ -1,0 +1,139 @@
+"""The commands except ``run``; each takes its arguments and returns an exit code."""
+
+import importlib
+import importlib.util
+from pathlib import Path
+
+import warp as wp
+
+from warp_contact.errors import UsageError
+from warp_contact.picture.files import animate
+from warp_contact.picture.render import render
+from warp_contact.scene.mesh import TetMesh
+from warp_contact.usd.check import problems
+from warp_contact.usd.reader import frame_numbers, open_stage, read_bodies
+
+
+def scenes(args) -> int:
+    """List the scenes."""
+    package = importlib.import_module("warp_contact.scenes")
+    names = package.names()
+    width = max(map(len, names), default=0)
+    for name in names:
+        first = (package.load(name).__doc__ or "").strip().partition("\n")[0]
+        print(f"{name:{width}}  {first}".rstrip())
+    return 0
+
+
+def info(args) -> int:
+    """Say what is in a file."""
+    path = Path(args.file)
+    if not path.exists():
+        raise UsageError(f"no such file: {path}")
+    if path.is_dir() or path.suffix.startswith(".usd"):
+        stage = open_stage(path)
+        bodies = read_bodies(stage) if stage.GetDefaultPrim() else []
+        if bodies:
+            return stage_info(stage, bodies)
+    return mesh_info(path)
+
+
+def stage_info(stage, bodies) -> int:
+    """Print the frames and bodies of a stage."""
+    frames, fps = frame_numbers(stage), stage.GetTimeCodesPerSecond()
+    rows = []
+    for body in bodies:
+        points, faces = (
+            body.mesh.GetPointsAttr().Get(frames[0]),
+            body.mesh.GetFaceVertexCountsAttr(),
+        )
+        tets = len(body.sim.GetTetVertexIndicesAttr().Get()) if body.sim else 0
+        vertices = len(body.sim.GetPointsAttr().Get()) if body.sim else len(points)
+        rows.append((body, vertices, len(faces.Get()), tets))
+    vertices, triangles, tets = (sum(row[k] for row in rows) for k in (1, 2, 3))
+    print(f"file    {stage.GetRootLayer().realPath}")
+    print(f"frames  {frames[0]} to {frames[-1]}, {fps:g} a second, {(len(frames) - 1) / fps:g} s")
+    print(f"bodies  {len(rows)}: {vertices} vertices, {tets} tets, {triangles} surface triangles")
+    width = max(len(body.label) for body in bodies)
+    for body, vertices, triangles, tets in rows:
+        fixed = "  fixed" if body.fixed else ""
+        print(f"  {body.label:{width}} {vertices:7} {tets:7} {triangles:7}{fixed}")
+    return 0
+
+
+def mesh_info(path: Path) -> int:
+    """Print the counts, volume and quality of a tet mesh."""
+    mesh = TetMesh.load(path)
+    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
+    print(f"file     {path}")
+    print(f"counts   {len(mesh.vertices)} vertices, {len(mesh.tets)} tets, ", end="")
+    print(f"{len(mesh.surface)} surface triangles")
+    print(f"size     {' x '.join(f'{d:.6g}' for d in high - low)} m, volume {mesh.volume:.6g} m^3")
+    print(f"quality  {mesh.quality.min():.3f} to {mesh.quality.max():.3f} (1: regular, 0: flat)")
+    return 0
+
+
+def draw(args) -> int:
+    """Draw pictures."""
+    if not Path(args.file).exists():
+        raise UsageError(f"no such file: {args.file}")
+    stage = open_stage(args.file)
+    try:
+        wp.get_device(args.device)
+        frames = chosen_frames(args.frames, frame_numbers(stage))
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    kinds = [kind for kind in ("webp", "gif") if getattr(args, kind)]
+    if kinds and importlib.util.find_spec("PIL") is None:
+        raise UsageError("animations need Pillow: pip install 'warp_contact[render]'")
+    root = Path(stage.GetRootLayer().realPath)
+    out = args.out or root.parent / "pictures"
+    looks = {"samples": args.samples, "wire": args.wire, "device": args.device}
+    if not args.quiet:
+        looks["report"] = lambda path: print(path, flush=True)
+    pictures = render(stage, out, frames, args.size, args.eye, args.target, **looks)
+    for kind in kinds:
+        rate = stage.GetTimeCodesPerSecond() * len(frames) / max(1, frames[-1] - frames[0] + 1)
+        animate(pictures, out / f"{root.stem}.{kind}", rate)
+        if not args.quiet:
+            print(out / f"{root.stem}.{kind}")
+    return 0
+
+
+def chosen_frames(text: str | None, every: range) -> list[int]:
+    """Frames from numbers and slices, such as ``0,30,-1`` or ``0:120:2``; -1 is the last."""
+    if text is None:
+        return list(every)
+    end, frames = every[-1] + 1, []
+    for item in text.split(","):
+        try:
+            parts = [int(part) if part else None for part in item.split(":")]
+        except ValueError:
+            parts = []
+        if parts in ([], [None]) or len(parts) > 3 or parts[2:] == [0]:
+            raise ValueError(f"--frames {text}: {item!r} is neither a number nor first:end:step")
+        ends = [end + part if part is not None and part < 0 else part for part in parts[:2]]
+        if len(parts) == 1:
+            found = [frame for frame in ends if frame in every]
+        else:
+            first = every[0] if ends[0] is None else ends[0]
+            last = end if ends[1] is None else ends[1]
+            numbers = range(first, last, *filter(None, parts[2:]))
+            found = [frame for frame in numbers if frame in every]
+        if not found:
+            raise ValueError(f"no frame {item}: the file has {every[0]} to {every[-1]}")
+        frames += found
+    return frames
+
+
+def validate(args) -> int:
+    """Check a file and print what is wrong with it."""
+    if not Path(args.file).exists():
+        raise UsageError(f"no such file: {args.file}")
+    found = problems(args.file)
+    for line in found:
+        print(line)
+    if not found:
+        frames = frame_numbers(open_stage(args.file))
+        print(f"ok: frames {frames[0]} to {frames[-1]}")
+    return 1 if found else 0

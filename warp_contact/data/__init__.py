@@ -1,0 +1,1 @@
+"""The arrays of a simulation: what stays, evolves or is shared by stages, which import them."""

@@ -1,0 +1,32 @@
+"""The room that a frame needs in its buffers, where it had too little."""
+
+from dataclasses import astuple
+
+import numpy as np
+
+from warp_contact.data.contacts import Capacity
+from warp_contact.data.work import Work
+
+
+def enlarged(work: Work) -> Capacity | None:
+    """Twice what the frame would have needed, or None where all fitted.
+
+    What is more than half full then grows too: lists grow together, and each time that one does not
+    fit its frame is lost.
+    """
+    needed = work.contacts.needed.numpy()
+    if not needed.any():
+        return None
+    have = np.array(astuple(work.capacity))
+    used = np.maximum(needed, np.minimum(_used(work), have))
+    return Capacity(*np.where(2 * used > have, 2 * used, have).tolist())
+
+
+def _used(work: Work) -> np.ndarray:
+    """What the last step used, or the last that used any, in the order of ``Capacity``."""
+    verts, edges = work.candidates.verts, work.candidates.edges
+    counts = [work.contacts.n, verts.n, verts.item_start[-1:], edges.n, edges.item_start[-1:]]
+    contacts, n_vert, n_tet, n_edge, n_tri = (int(n.numpy()[0]) for n in counts)
+    pairs = int((work.pair_key.numpy() >= 0).sum())
+    near = int(work.near.tris.numpy().max(initial=0))
+    return np.array([contacts, pairs, n_vert, n_tet, n_edge, n_tri, near])

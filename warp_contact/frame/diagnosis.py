@@ -1,0 +1,31 @@
+"""Names of what a run broke down at."""
+
+import numpy as np
+import warp as wp
+
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+
+
+def lost_vertex(state: State) -> int | None:
+    """The first vertex whose position or velocity is not finite."""
+    finite = np.isfinite(state.x.numpy()).all(1) & np.isfinite(state.v.numpy()).all(1)
+    return None if finite.all() else int((~finite).argmax())
+
+
+def vertex_name(model: Model, vertex: int) -> str:
+    """Body of a vertex, and its number there."""
+    body = int(model.vert_body.numpy()[vertex])
+    return f"body '{model.labels[body]}', vertex {vertex - int(model.body_vert.numpy()[body])}"
+
+
+def flattest_tet(model: Model, x: wp.array) -> str:
+    """Body of the tet with the least height, volume over largest face, and its number there."""
+    at = x.numpy().astype(np.float64)
+    a, b, c, d = np.moveaxis(at[model.tets.numpy()], 1, 0)
+    faces = ((b, c, d), (a, c, d), (a, b, d), (a, b, c))
+    area = [np.linalg.norm(np.cross(q - p, r - p), axis=1) for p, q, r in faces]
+    volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a))
+    k = int((volume / np.maximum(np.max(area, axis=0), 1e-30)).argmin())
+    body = int(model.vert_body.numpy()[model.tets.numpy()[k, 0]])
+    return f"body '{model.labels[body]}', tet {k - int(model.body_tet.numpy()[body])}"

@@ -1,0 +1,25 @@
+"""Kernels compiled ahead, several modules at a time; each compiles on its first use otherwise."""
+
+import warp as wp
+
+from warp_contact.data.model import Model
+from warp_contact.kernels.broad_phase import bounds, edges, hashing, margins, near, pairs
+from warp_contact.kernels.elastic import shape
+from warp_contact.kernels.impulse import impulse, pair_impulses, persistent, warm_start
+from warp_contact.kernels.motion import lanczos, motion
+from warp_contact.kernels.narrow_phase import contact_graph, depth, vertex_contact, vertices
+from warp_contact.kernels.narrow_phase import edges as crossing
+from warp_contact.kernels.surface import closure
+
+# What a frame of any scene uses. The search for overlaps at the start, other responses, sleep and
+# measuring are left out: many scenes do without.
+ALWAYS = (bounds, edges, hashing, margins, near, pairs, shape, lanczos, motion, closure)
+ALWAYS += (impulse, pair_impulses, persistent, warm_start)
+ALWAYS += (contact_graph, crossing, depth, vertex_contact, vertices)
+
+
+def load_kernels(model: Model, device: wp.Device) -> None:
+    """Load what a frame uses on ``device``; where the cache of Warp lacks it, compile it first."""
+    modules = {*ALWAYS, *(e.kernels for e in model.elements)}
+    names = sorted(module.__name__ for module in modules)
+    wp.force_load(device, [wp.get_module(name) for name in names])

@@ -1,0 +1,170 @@
+"""Bodies that are at rest sleep: nothing is computed for them until something comes near.
+
+What sleeps stays within ``kernels.rest.STILL`` of an edge of where it was ``REST_TIME`` before; the
+contact forces and pressures on it are those of its last frame awake, and it counts no contacts.
+Momentum and energy change by what motion it had left. What creeps slower than ``STILL`` in
+``REST_TIME`` is stopped, but for what moves because fixed vertices do. ``Simulation.set_velocity``
+wakes a body; a small velocity written into ``Simulation.state`` is lost on one that sleeps.
+
+Only for scenes with gravity: what stays where it is although it has weight is held.
+"""
+
+import math
+
+import numpy as np
+import warp as wp
+
+from warp_contact.data.model import Model
+from warp_contact.data.state import Awake, State
+from warp_contact.data.work import Work, launch_body_boxes
+from warp_contact.kernels.motion import sleeping as kernels
+
+REST_TIME = 0.5  # s that a body has to be at rest before it may sleep
+
+
+class Rest:
+    """Knows for how long each body has been at rest; its ``awake`` says who moves."""
+
+    def __init__(self, model: Model, state: State, fps: float):
+        """Everything is awake; frames come ``fps`` times a second."""
+        self.model = model
+        self.awake = Awake(
+            bodies=wp.full(model.n_body, 1, dtype=int),
+            tets=wp.full(model.n_tet, 1, dtype=int),
+            inv_mass=wp.clone(model.inv_mass),
+        )
+        self._time = 1.0 / fps
+        self._wanted = max(2, math.ceil(REST_TIME * fps))
+        self._anchor = wp.clone(state.x)
+        self._frames = wp.zeros(model.n_body, dtype=int)
+        self._moved, self._mobile = (wp.zeros(model.n_body, dtype=int) for _ in range(2))
+        self._reach = wp.zeros(model.n_body, dtype=float)
+        self._speed = wp.zeros(1, dtype=float)
+        self._again = wp.zeros(1, dtype=int)
+        self._before = np.ones(model.n_body, dtype=np.int32)  # awake in the last frame
+
+    def values(self, work: Work) -> dict[str, np.ndarray]:
+        """What another one needs to go on from here."""
+        awake = np.append(self.awake.bodies.numpy() == 1, np.zeros(self.model.n_plane, dtype=bool))
+        key, total = work.pair_key.numpy(), work.pair_total.numpy()
+        key, total = key[key >= 0], total[key >= 0]
+        kept = ~awake[key >> 32] & ~awake[key & 0xFFFFFFFF]
+        asleep = ~awake[self.model.vert_body.numpy()]
+        return {
+            "anchor": self._anchor.numpy(),
+            "frames": self._frames.numpy(),
+            "awake": self.awake.bodies.numpy(),
+            "impulse": np.where(asleep[:, None], work.impulse.numpy(), np.float32(0.0)),
+            "pair_key": key[kept],
+            "pair_total": total[kept],
+        }
+
+    def restore(self, values: dict[str, np.ndarray], work: Work) -> None:
+        """Take over the ``values`` of another one; ``work`` has room for its pairs."""
+        n = len(values["pair_key"])
+        self._anchor.assign(values["anchor"])
+        self._frames.assign(values["frames"])
+        self.awake.bodies.assign(values["awake"])
+        self._before = values["awake"]
+        self._pause(work)
+        work.impulse.assign(values["impulse"])
+        if n:
+            work.pair_key[:n].assign(values["pair_key"])
+            work.pair_total[:n].assign(values["pair_total"])
+
+    def wake(self, body: int) -> None:
+        """Let a body's rest begin anew."""
+        self._frames[body : body + 1].zero_()
+
+    def wake_all(self, work: Work) -> None:
+        """Let everybody's rest begin anew, awake in the next frame."""
+        self._frames.zero_()
+        self.awake.bodies.fill_(1)
+        self._before = np.ones(self.model.n_body, dtype=np.int32)
+        self._pause(work)
+
+    def update(self, state: State, work: Work) -> bool:
+        """Before a frame: decide who sleeps. False when nothing is awake."""
+        model, awake = self.model, self.awake
+        for array in (self._moved, self._mobile, self._speed):
+            array.zero_()
+        wp.launch(
+            kernels.watch,
+            dim=model.n_vert,
+            inputs=[self._time, model.vert_body, model.body_edge, model.inv_mass, self._anchor]
+            + [state.x, state.v],
+            outputs=[self._moved, self._speed, self._mobile],
+        )
+        wp.launch(
+            kernels.begin_rest,
+            dim=model.n_vert,
+            inputs=[model.vert_body, self._moved, state.x],
+            outputs=[self._anchor],
+        )
+        gravity = float(np.linalg.norm(model.gravity))
+        wp.launch(
+            kernels.count_rest,
+            dim=model.n_body,
+            inputs=[self._wanted, self._time, gravity, model.body_edge, self._moved, self._speed],
+            outputs=[self._frames, awake.bodies, self._reach],
+        )
+        bodies = awake.bodies.numpy()
+        if bodies.all() and self._before.all():
+            return True
+        launch_body_boxes(model, state.x, self._reach, work.lower, work.upper)
+        work.bodies.rebuild()
+        self._again.fill_(1)
+        wp.capture_while(self._again, lambda: self._wake(work))
+        bodies = awake.bodies.numpy()
+        if (bodies != self._before).any():
+            self._before = bodies.copy()
+            self._pause(work)
+        return bool(bodies.any())
+
+    def _pause(self, work: Work) -> None:
+        """Let the tets know, and find new candidates."""
+        wp.launch(
+            kernels.pause_tets,
+            dim=self.model.n_tet,
+            inputs=[self.model.tet_body, self.awake.bodies],
+            outputs=[self.awake.tets],
+        )
+        work.candidates.stale.fill_(1)
+
+    def _wake(self, work: Work) -> None:
+        self._again.zero_()
+        wp.launch(
+            kernels.wake_island,
+            dim=self.model.n_body,
+            inputs=[work.bodies.id, self.model.body_world, work.lower, work.upper, self._mobile],
+            outputs=[self.awake.bodies, self._again],
+        )
+
+    def skip_frame(self, state: State, work: Work) -> None:
+        """Stop everything."""
+        state.v.zero_()
+        work.contacts.n.zero_()
+
+    def begin_frame(self, state: State, work: Work) -> None:
+        """Stop who sleeps, and forget the contact forces of all others."""
+        model, awake = self.model, self.awake
+        wp.launch(
+            kernels.pause_vertices,
+            dim=model.n_vert,
+            inputs=[model.vert_body, model.inv_mass, awake.bodies],
+            outputs=[awake.inv_mass, state.v, work.impulse],
+        )
+        wp.launch(
+            kernels.clear_pairs,
+            dim=work.pair_key.shape[0],
+            inputs=[awake.bodies],
+            outputs=[work.pair_key, work.pair_total],
+        )
+
+
+def keep_forces(impulse: wp.array, pair_key: wp.array, pair_total: wp.array, after: Work) -> None:
+    """Copy the contact forces of the last frame, which those asleep still have, to a larger one."""
+    n = pair_key.shape[0]
+    wp.copy(after.impulse, impulse)
+    wp.copy(after.pair_key[:n], pair_key)
+    wp.copy(after.pair_total[:n], pair_total)

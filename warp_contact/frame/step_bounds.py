@@ -1,0 +1,114 @@
+"""How many equal steps a frame takes, and whether they proved enough.
+
+    stable  = omega / (2 SAFETY)                     [1/s]  2 / omega is stable without damping
+    passing = u / (REACH t)                          [1/s]  nothing jumps through a body
+    gentle  = min(u / (TRAVEL e), PATIENCE stable)   [1/s]  an impact does not crush a tet at once
+    n       = max(ceil(max(stable, passing, gentle) / fps), floor(KEEP n_last), 1)
+
+omega is the largest frequency of the elastic forces [1/s], u the largest relative speed [m/s], t
+the thickness of the thinnest body [m] and e the shortest mean edge of a body [m]. They are those at
+the start of the frame. While there may be overlaps from before, LINGERING stands for TRAVEL. At its
+end the step must still be below ``UNSTABLE`` of ``forces.longest_step`` / omega, and its damping
+within ``forces.reach``; a frame that fails is repeated at the rates found there.
+"""
+
+import math
+
+from warp_contact.step.forces import longest_step, reach, share_for, stages_for
+
+SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
+UNSTABLE = 0.99  # of the longest stable step at the end of a frame, above which it is repeated
+RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
+CUT_SHORT = 2.0  # the same, in one whose steps were seen to be too long before its end
+EXPLODED = 4.0  # times the frequency that the step was long enough for, at most
+REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
+TRAVEL = 0.1  # of the shortest mean edge: the same, for the tets where something strikes
+LINGERING = 0.025  # as TRAVEL, where overlaps may last some steps
+PATIENCE = 2.0  # stable steps, at most, that both are worth
+BLURRED = 1.05  # times the stable step: how well that is known
+LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 let some pass
+KEEP = (
+    0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
+)
+
+
+def steps_per_second(
+    omega: float, speed: float, thickness: float, edge: float, overlaps: bool
+) -> float:
+    """Steps [1/s] that are stable, and short against the thinnest body and the edges.
+
+    Args:
+        omega: largest frequency [1/s]
+        speed: largest relative speed [m/s]
+        thickness: of the thinnest body [m]
+        edge: shortest mean edge of a body [m]
+        overlaps: whether some may last: of the start, or such that the response leaves
+    """
+    stable = omega / (2.0 * SAFETY)
+    passing = speed / (REACH * thickness)
+    travel = LINGERING if overlaps else TRAVEL
+    gentle = min(speed / (travel * edge), PATIENCE * stable)
+    return max(stable, passing, gentle)
+
+
+def steps_in_frame(per_second: float, fps: float, last: int) -> int:
+    """Whole steps in a frame: ``per_second`` [1/s], and hardly fewer than the ``last`` frame's."""
+    return max(1, int(KEEP * last), math.ceil(per_second / fps))
+
+
+def with_penalty(omega: float, stiffness: float, inv_mass: float) -> float:
+    """Frequency [1/s] with a penalty [N/m] on the lightest vertex, of ``inv_mass`` [1/kg]."""
+    return math.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
+
+
+def stays_stable(dt: float, omega: float, rate: float) -> bool:
+    """Whether a step ``dt`` [s] is stable at the frequency ``omega`` [1/s] of its frame's end.
+
+    With the damping of a ``rate`` [1/s] at its start.
+    """
+    return dt * omega <= UNSTABLE * longest_step(stages_for(rate, dt), share_for(rate, dt))
+
+
+def stays_damped(dt: float, rate: float, after: float) -> bool:
+    """Whether stages and share for the damping ``rate`` [1/s] do for that ``after`` it too."""
+    return after * dt <= reach(stages_for(rate, dt), share_for(rate, dt))
+
+
+def served(dt: float) -> float:
+    """The frequency [1/s] that a step ``dt`` [s] is chosen for, where no other limit counts."""
+    return 2.0 * SAFETY / dt
+
+
+def raised(
+    before: tuple[float, float], after: tuple[float, float], dt: float, least: float = RAISED
+) -> tuple[float, float]:
+    """Frequency and damping rate [1/s] for the repeat of a frame whose step was too long.
+
+    Args:
+        before: at its start
+        after: where that was seen; a state that has begun to explode is no guide
+        dt: the step [s]; more than ``before`` may have asked for it
+        least: times the frequency, at least
+    """
+    most = EXPLODED * max(before[0], served(dt))
+    fast = max(before[1], min(after[1], EXPLODED**2 * max(before[1], 1.0 / dt)))
+    return min(max(least * before[0], after[0]), most), fast
+
+
+def fault(dt: float, omega: float, speed: float, thickness: float) -> str:
+    """Why a step ``dt`` [s] that the user chose cannot be taken, or nothing.
+
+    The speed matters at the start of a run only: in an impact single vertices are faster.
+
+    Args:
+        dt: step [s]
+        omega: largest frequency [1/s]
+        speed: largest relative speed [m/s]
+        thickness: of the thinnest body [m]
+    """
+    if dt * omega > 2.0 * BLURRED:
+        return f"a step of {dt:.3g} s is unstable, the longest stable one is {2.0 / omega:.3g} s"
+    if dt * speed > LEAP * thickness:
+        way = f"bodies move {dt * speed:.3g} m against each other in a step of {dt:.3g} s"
+        return f"{way}, and could pass through the thinnest body, of {thickness:.3g} m"
+    return ""

@@ -1,0 +1,284 @@
+"""One frame of a simulation: its steps, and once more where they or their buffers did not do."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+
+from warp_contact.data import warm_start
+from warp_contact.data.contacts import Capacity
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.data.work import Work, allocate_work
+from warp_contact.errors import SimulationError
+from warp_contact.frame import checkpoint
+from warp_contact.frame.capacity import enlarged
+from warp_contact.frame.diagnosis import flattest_tet, lost_vertex, vertex_name
+from warp_contact.frame.sleeping import Rest, keep_forces
+from warp_contact.frame.spectrum import Spectrum
+from warp_contact.frame.step_bounds import (
+    CUT_SHORT,
+    RAISED,
+    raised,
+    served,
+    stays_damped,
+    stays_stable,
+)
+from warp_contact.frame.step_count import Pace
+from warp_contact.step import step
+from warp_contact.step.forces import share_for, stages_for
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+
+NEIGHBOURS = 8  # pairs with a contact force for each body that there is room for at first
+UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
+HALVED = 3  # times that the steps of a frame are halved because its state, or stiffness, is lost
+NO_RATES = math.inf, math.inf  # of a state that is lost
+PART = 8  # steps between two looks at the rates, in frames that begin or end with a flat tet
+ATTEMPTS = 12  # at a frame, with shorter steps each time
+
+
+class Stepper:
+    """Steps a state frame by frame, in place.
+
+    Attributes:
+        fps: frames per second
+        wanted: steps in a frame that the user chose, or None
+        n: steps of the last frame
+        dt: their length [s], None before the first
+        rates: largest elastic frequency and damping rate at its end [1/s], None where to be found
+        search: whether there may be overlaps that no step created; None where nobody has looked
+        work: buffers, with the contacts of the last step
+        rest: who sleeps; None where nobody may
+        spectrum: finds the rates
+        unit: resolution of the recorded contact impulses [N s]
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        state: State,
+        response: ContactSurface | Penalty | PredictedForce,
+        fps: float,
+        wanted: int | None,
+        sleeping: bool,
+    ):
+        """Allocate what the steps need, on the current device."""
+        self.fps, self.wanted = fps, wanted
+        self.n = 0
+        self.dt: float | None = None
+        self.rates: tuple[float, float] | None = None
+        self.search: bool | None = None
+        self._model, self._state, self._response = model, state, response
+        self._pace = Pace(model, response, fps, wanted)
+        self.spectrum = Spectrum(model)
+        # Without weight, what hardly moves need not be held by anything: it flies.
+        sleeping = sleeping and any(model.gravity)
+        self.rest = Rest(model, state, fps) if sleeping else None
+        pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
+        self.work: Work = self._allocate(Capacity(pairs=pairs))
+        self._graphs: dict[tuple[int, bool], wp.Graph] = {}
+        self._saved = State(wp.clone(state.x), wp.clone(state.v))
+        self._saved_warm = warm_start.allocate(model.n_vert, self.work.capacity.contacts)
+        inv_mass = model.inv_mass.numpy()
+        mobile = float(model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
+        self.unit = UNIT * (mobile if mobile > 0.0 else 1.0)
+
+    def step(self, frame: int) -> None:
+        """Step frame number ``frame``.
+
+        A frame that outgrew its buffers, or whose step turned out too long for the deformation
+        that came, is repeated from its start. Where it begins or ends with a tet that is nearly
+        flat, the step is looked at every ``PART`` steps.
+
+        Raises:
+            SimulationError: no step is stable, or the state does not stay finite; it is then that
+                of the last finished frame
+        """
+        if self.rest and self.search is False:  # an overlap that is left has to be searched
+            if not self.rest.update(self._state, self.work):
+                self.rest.skip_frame(self._state, self.work)
+                return
+        wp.copy(self._saved.x, self._state.x)
+        wp.copy(self._saved.v, self._state.v)
+        warm_start.copy(self._saved_warm, self.work.warm)
+        while self.search is None or self.grow():
+            self.search = step.overlaps(self._model, self._state, self.work)
+        omega, rate = self.rates or self.spectrum.rates(self._state.x)
+        self._pace.check(self._state, omega, frame)
+        last, halved = self.n, 0
+        in_parts = self._flat()
+        for _ in range(ATTEMPTS):
+            dt, after, wrong = self._run(omega, rate, last, frame, in_parts)
+            while self.grow():
+                dt, after, wrong = self._run(omega, rate, last, frame, in_parts)
+            fits = not wrong and self._fits(dt, rate, after)
+            flat = in_parts or bool(wrong) or self._flat()
+            if fits and (in_parts or not flat):
+                break
+            self._go_back()
+            if wrong:
+                if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
+                    raise SimulationError(f"frame {frame}: {wrong} ({self.n} substeps)")
+                halved += 1
+                omega, rate = 2.0 * max(omega, served(dt)), 2.0 * rate
+            elif not fits:
+                least = CUT_SHORT if in_parts else RAISED
+                omega, rate = raised((omega, rate), after, dt, least)
+            in_parts = flat
+        else:
+            raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
+        self.rates = after
+        self.dt = dt
+        self.search = self.search and bool(self.work.deep_found.numpy()[0])
+
+    def _look(self) -> tuple[tuple[float, float], str]:
+        """Rates of the present state [1/s], and what is wrong with it: empty where nothing is."""
+        lost = lost_vertex(self._state)
+        if lost is not None:
+            return NO_RATES, f"{vertex_name(self._model, lost)} is no longer finite"
+        after = self.spectrum.rates(self._state.x)
+        if not np.isfinite(after).all():
+            tet = flattest_tet(self._model, self._state.x)
+            return NO_RATES, f"stiffness is no longer finite, the flattest is {tet}"
+        return after, ""
+
+    def _flat(self) -> bool:
+        """Whether a tet was flat at the last look, and the number of steps is free."""
+        return self.wanted is None and self.spectrum.flat
+
+    def _fits(self, dt: float, rate: float, after: tuple[float, float]) -> bool:
+        """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] do for rates ``after`` them."""
+        stable = self.wanted is not None or stays_stable(dt, after[0], rate)
+        return stable and stays_damped(dt, rate, after[1])
+
+    def look_anew(self) -> None:
+        """Before the next frame: positions were set from outside."""
+        self.search = None
+        self.rates = None
+        if self.rest:
+            self.rest.wake_all(self.work)
+
+    def use(self, work: Work) -> None:
+        """Go on in other buffers."""
+        self.work = work
+        self._graphs.clear()
+
+    def grow(self) -> bool:
+        """Enlarge the buffers that the frame outgrew, and go back to its start; True if any."""
+        capacity = enlarged(self.work)
+        if capacity is None:
+            return False
+        self._go_back()
+        forces = self.work.impulse, self.work.pair_key, self.work.pair_total
+        self._replace_work(capacity)
+        if self.rest:
+            keep_forces(*forces, self.work)
+        return True
+
+    def values(self) -> dict[str, np.ndarray]:
+        """What a checkpoint needs, beside the state."""
+        values = {"substeps": np.array(self.n)}
+        values |= {f"start.{k}": start for k, start in self.spectrum.starts().items()}
+        values |= {f"warm.{k}": value for k, value in warm_start.values(self.work.warm).items()}
+        if self.rest:
+            values |= {f"rest.{k}": value for k, value in self.rest.values(self.work).items()}
+        if self.search is not None:
+            values |= {"search": np.array(self.search)}
+        if self.dt is not None:
+            values |= {"dt": np.array(self.dt)}
+        if self.rates is not None:
+            values |= {"rates": np.array(self.rates)}
+        return values
+
+    def restore(self, values: dict[str, np.ndarray]) -> None:
+        """Take over the ``values`` of another one of the same scene and settings."""
+        self.n = int(values["substeps"])
+        self.spectrum.start_from(checkpoint.part(values, "start"))
+        rest = checkpoint.part(values, "rest")
+        impulses = checkpoint.part(values, "warm")
+        have = self.work.capacity
+        pairs = max(have.pairs, len(rest.get("pair_key", ())))
+        contacts = max(have.contacts, len(impulses["held"]))
+        self._replace_work(replace(have, pairs=pairs, contacts=contacts))
+        warm_start.restore(self.work.warm, impulses)
+        if self.rest:
+            self.rest.restore(rest, self.work)
+        self.search = bool(values["search"]) if "search" in values else None
+        self.dt = float(values["dt"]) if "dt" in values else None
+        self.rates = tuple(map(float, values["rates"])) if "rates" in values else None
+
+    def _run(
+        self, omega: float, rate: float, last: int, frame: int, in_parts: bool
+    ) -> tuple[float, tuple[float, float], str]:
+        """Step the frame at the rates [1/s] given, after ``last`` steps.
+
+        Return the step [s] and what ``_look`` finds at the end. With ``in_parts`` that is where the
+        step does not fit any more; where the buffers were outgrown, nothing was found.
+        """
+        work = self.work
+        if self.rest:
+            self.rest.begin_frame(self._state, work)
+        else:
+            work.impulse.zero_()
+            work.pair_key.fill_(-1)
+            work.pair_total.zero_()
+        n = self._pace.steps(self._state, omega, last, frame, bool(self.search))
+        dt = 1.0 / (self.fps * n)
+        stages = stages_for(rate, dt)
+        if self.dt is not None and dt != self.dt:
+            work.dt.fill_(0.5 * (self.dt - dt))
+            step.kick(self._model, self._state, work)  # velocities lag by half a step
+        work.dt.fill_(dt)
+        work.share.fill_(share_for(rate, dt))
+        work.contacts.needed.zero_()
+        work.deep_found.zero_()
+        work.bodies.rebuild()
+        self.n = n
+        after, wrong = NO_RATES, ""
+        part = PART if in_parts else n
+        for first in range(0, n, part):
+            work.steps.fill_(min(part, n - first))
+            wp.capture_launch(self._graph(stages))
+            if enlarged(work) is not None:
+                break
+            after, wrong = self._look()
+            if wrong or not self._fits(dt, rate, after):
+                break
+        return dt, after, wrong
+
+    def _graph(self, stages: int) -> wp.Graph:
+        """The captured steps of a frame, with so many stages of damping."""
+        key = stages, self.search
+        if key not in self._graphs:
+            arguments = self._model, self._state, self.work, self._response, *key, self.unit
+            with wp.ScopedCapture() as capture:
+                step.steps(*arguments)
+            self._graphs[key] = capture.graph
+        return self._graphs[key]
+
+    def _allocate(self, capacity: Capacity) -> Work:
+        awake = self.rest.awake if self.rest else None
+        return allocate_work(self._model, self._state, capacity, awake)
+
+    def _replace_work(self, capacity: Capacity) -> None:
+        """Allocate anew; old and new buffers at once would be the peak of the memory."""
+        before = self.work.capacity
+        self._graphs.clear()
+        del self.work
+        try:
+            self.work = self._allocate(capacity)
+            saved = warm_start.allocate(self._model.n_vert, capacity.contacts)
+        except RuntimeError:  # there is no memory for it
+            self.work = self._allocate(before)
+            warm_start.copy(self.work.warm, self._saved_warm)
+            raise
+        warm_start.copy(saved, self._saved_warm)
+        warm_start.copy(self.work.warm, saved)
+        self._saved_warm = saved
+
+    def _go_back(self) -> None:
+        """Restore the state at the start of the frame."""
+        wp.copy(self._state.x, self._saved.x)
+        wp.copy(self._state.v, self._saved.v)
+        warm_start.copy(self.work.warm, self._saved_warm)

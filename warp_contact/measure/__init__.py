@@ -1,0 +1,1 @@
+"""Figures of a state: energies, momenta, overlaps, contact forces. Only reads."""

@@ -1,0 +1,280 @@
+"""Energies, momenta, overlaps and contact forces of a state, for people and for tests."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.data.work import Work
+from warp_contact.kernels.broad_phase import bounds
+from warp_contact.kernels.motion import motion
+from warp_contact.kernels.output import measure as kernels
+from warp_contact.kernels.output import tunnelling
+from warp_contact.scene import topology
+from warp_contact.step.forces import energies, internal_forces
+
+UNHELD = 0.01  # of the mean edge of a vertex's body: what is less deep needs no contact
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One frame in numbers.
+
+    Attributes:
+        kinetic: energy [J] at the time of the frame; the velocities of symplectic Euler are those
+            of half a step earlier, so h/2 times the power of internal forces and gravity is added.
+            The sum of all energies is then constant where a linear material flies freely, and a
+            contact impulse p changes it by p . (v + v') / 2, v and v' the velocities before and
+            after the step: not at all while the contact stays closed
+        elastic: energy [J]
+        gravitational: energy against the origin [J]
+        momentum: [kg m/s], shape (3,)
+        angular_momentum: about the origin [kg m^2/s], shape (3,)
+        overlap: deepest overlap of a vertex or an edge [m]
+        overlap_pair: labels of its bodies, None without overlap
+        n_contacts: contacts in the last step
+        volume_ratio: smallest volume of a tet over its rest volume
+        inverted: tets that are inside out or flat
+        tunnelled: points that went through another body so far; a point is a surface vertex or the
+            middle of a surface edge. It counts where it goes out by a face that looks away from the
+            one by which it came in and was deeper than a tenth of the body's thickness (twice its
+            volume over its surface), or where it gets deeper below a plane than its own body is
+            thick. From one call to the next, ways are taken as straight: call often. Not seen:
+            what happened before the first call, what turned round between two calls, points that
+            were inside a body at the first call, and parts that slip between the points of a
+            coarser body. A body that starts on both sides of another and is led back counts
+        tunnelled_pair: labels of the bodies of the last of these, the one that went through first
+        unheld: surface vertices in another body or below a plane, by more than 0.01 of a mean edge,
+            that had no contact in the last step
+        forces: mean contact force of the frame between two bodies, by their labels [N]
+    """
+
+    kinetic: float
+    elastic: float
+    gravitational: float
+    momentum: np.ndarray
+    angular_momentum: np.ndarray
+    overlap: float
+    overlap_pair: tuple[str, str] | None
+    n_contacts: int
+    volume_ratio: float
+    inverted: int
+    tunnelled: int
+    tunnelled_pair: tuple[str, str] | None
+    unheld: int
+    forces: dict[tuple[str, str], float]
+
+    @property
+    def energy(self) -> float:
+        """Kinetic, elastic and gravitational energy [J]."""
+        return self.kinetic + self.elastic + self.gravitational
+
+
+class Meter:
+    """Measures states of one model; its memory is allocated at the first use.
+
+    It remembers the last state it measured, to tell what went through what since then.
+    """
+
+    def __init__(self, model: Model):
+        """Read what stays constant."""
+        self.model = model
+        self.mass = model.mass.numpy().astype(np.float64)
+        self.names = [*model.labels, *(f"plane{p}" for p in range(model.n_plane))]
+        self._tets = model.tets.numpy()
+        self._volume = model.volume.numpy()
+        self._bvhs = self._last = None
+        self._tunnelled, self._tunnelled_pair = 0, None
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """What it remembers of the states measured so far."""
+        if self._last is None:
+            return {}
+        kept = {"last": self._last, "entered": self._entered, "deep": self._deep}
+        memory = {name: array.numpy() for name, array in kept.items()}
+        return memory | {
+            "tunnelled": np.array(self._tunnelled),
+            "tunnelled_pair": np.array(self._tunnelled_pair or (), dtype=str),
+        }
+
+    def remember(self, memory: dict[str, np.ndarray]) -> None:
+        """Go on from the ``memory`` of another meter of the same model."""
+        if not memory:
+            return
+        self._begin(wp.array(memory["last"], dtype=wp.vec3))
+        self._entered.assign(memory["entered"])
+        self._deep.assign(memory["deep"])
+        self._tunnelled = int(memory["tunnelled"])
+        self._tunnelled_pair = tuple(memory["tunnelled_pair"].tolist()) or None
+
+    def measure(self, state: State, work: Work, unit: float, duration: float, dt: float) -> Measure:
+        """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s]."""
+        model = self.model
+        x = state.x.numpy().astype(np.float64)
+        v = state.v.numpy().astype(np.float64)
+        energy = wp.zeros(model.n_tet, dtype=float)
+        energies(model, state.x, energy)
+        p = self.mass[:, None] * v
+        ratio = topology.signed_volumes(x, self._tets) / self._volume
+        self.follow(state.x)
+        overlap, pair, unheld = self.overlap(state.x, work)
+        return Measure(
+            kinetic=float(0.5 * (p * v).sum() + 0.5 * dt * (self._forces(state.x) * v).sum()),
+            elastic=float(energy.numpy().sum(dtype=np.float64)),
+            gravitational=float(-(self.mass @ x) @ np.array(model.gravity)),
+            momentum=p.sum(axis=0),
+            angular_momentum=np.cross(x, p).sum(axis=0),
+            overlap=overlap,
+            overlap_pair=pair,
+            n_contacts=int((work.contacts.coef.numpy()[: self._n(work)] != 0.0).any(1).sum()),
+            volume_ratio=float(ratio.min()),
+            inverted=int((ratio <= 0.0).sum()),
+            tunnelled=self._tunnelled,
+            tunnelled_pair=self._tunnelled_pair,
+            unheld=unheld if duration > 0.0 else 0,
+            forces=self.forces(work, unit, duration),
+        )
+
+    def _forces(self, x: wp.array) -> np.ndarray:
+        """Internal forces and weight [N] of the mobile vertices, shape (n_vert, 3)."""
+        model = self.model
+        f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
+        f = wp.zeros(model.n_vert, dtype=wp.vec3)
+        internal_forces(model, x, wp.full(model.n_tet, 1, dtype=int), f_tet)
+        wp.launch(
+            motion.gather,
+            dim=model.n_vert,
+            inputs=[model.vt_start, model.vt_corner, f_tet],
+            outputs=[f],
+        )
+        total = f.numpy() + self.mass[:, None] * np.array(model.gravity)
+        return np.where(model.inv_mass.numpy()[:, None] > 0.0, total, 0.0)
+
+    def forces(self, work: Work, unit: float, duration: float) -> dict[tuple[str, str], float]:
+        """Mean force between the bodies of each touching pair [N], in the order of the bodies."""
+        key = work.pair_key.numpy()
+        total = work.pair_total.numpy() * unit
+        out = {}
+        for k in np.argsort(key):
+            if key[k] >= 0 and duration > 0.0:
+                pair = self.names[key[k] >> 32], self.names[key[k] & 0xFFFFFFFF]
+                out[pair] = float(np.linalg.norm(total[k]) / duration)
+        return out
+
+    def overlap(self, x: wp.array, work: Work) -> tuple[float, tuple[str, str] | None, int]:
+        """Deepest overlap [m], the labels of its bodies, and the vertices that nothing holds."""
+        model = self.model
+        bodies, surface, volumes = self._refit(x, x)
+        at_vert = wp.zeros(model.n_surf, dtype=float), wp.zeros(model.n_surf, dtype=int)
+        at_edge = wp.zeros(model.n_edge, dtype=float), wp.zeros(model.n_edge, dtype=int)
+        wp.launch(
+            kernels.vertex_overlaps,
+            dim=model.n_surf,
+            inputs=[volumes.id, surface.id, model.surf, model.tets, model.tris]
+            + [model.vert_body, model.body_world, model.body_edge]
+            + [model.plane_n, model.plane_h, x],
+            outputs=list(at_vert),
+        )
+        wp.launch(
+            kernels.edge_overlaps,
+            dim=model.n_edge,
+            inputs=[bodies.id, surface.id, model.tris, model.edges, model.vert_body]
+            + [model.body_world, model.body_edge, x],
+            outputs=list(at_edge),
+        )
+        depth = np.concatenate([at_vert[0].numpy(), at_edge[0].numpy()])
+        partner = np.concatenate([at_vert[1].numpy(), at_edge[1].numpy()])
+        first = np.concatenate([model.surf.numpy(), model.edges.numpy()[:, 0]])
+        k = int(depth.argmax())
+        if depth[k] <= 0.0:
+            return 0.0, None, 0
+        own = model.vert_body.numpy()[first]
+        awake = work.awake.bodies.numpy()[own] == 1  # the others are held
+        deep = awake & (depth > UNHELD * model.body_edge.numpy()[own])
+        unheld = np.setdiff1d(first[: model.n_surf][deep[: model.n_surf]], self._held(work))
+        return float(depth[k]), (self.names[own[k]], self.names[partner[k]]), len(unheld)
+
+    def _held(self, work: Work) -> np.ndarray:
+        """Vertices that a contact of the last step moved out of another body or plane."""
+        n = self._n(work)
+        own = work.contacts.vert.numpy()[:n, :2]  # the others are those of the other side
+        return own[work.contacts.coef.numpy()[:n, :2] != 0.0]
+
+    def _begin(self, x: wp.array) -> None:
+        """Remember the first state."""
+        surf = np.repeat(self.model.surf.numpy()[:, None], 2, axis=1)
+        ends = np.concatenate([surf, self.model.edges.numpy()[:, :2]])
+        self._ends = wp.array(ends, dtype=wp.vec2i)
+        self._entered = wp.full(len(ends), -1, dtype=int)
+        self._deep = wp.zeros(len(ends), dtype=int)
+        self._last = x
+
+    def follow(self, x: wp.array) -> None:
+        """Count the points that went through something since the last call."""
+        model = self.model
+        if self._last is None:
+            self._begin(wp.clone(x))
+            return
+        bodies, surface, _ = self._refit(self._last, x)
+        passed = wp.zeros(len(self._ends), dtype=int)
+        wp.launch(
+            tunnelling.follow_points,
+            dim=len(self._ends),
+            inputs=[bodies.id, surface.id, model.tris, model.tri_body, self._ends]
+            + [model.vert_body, model.body_world, model.body_thickness]
+            + [model.plane_n, model.plane_h, self._last, x],
+            outputs=[self._entered, self._deep, passed],
+        )
+        wp.copy(self._last, x)
+        body = passed.numpy()
+        through = np.flatnonzero(body >= 0)
+        self._tunnelled += len(through)
+        if len(through):
+            own = model.vert_body.numpy()[self._ends.numpy()[through[-1], 0]]
+            self._tunnelled_pair = self.names[own], self.names[body[through[-1]]]
+
+    def jump(self, x: wp.array, first: int, last: int) -> None:
+        """Go on from positions ``x`` that no motion led to, of the bodies ``first`` to ``last``."""
+        own = self.model.vert_body.numpy()[self._ends.numpy()[:, 0]]
+        entered, deep = self._entered.numpy(), self._deep.numpy()
+        into = np.where(entered < 0, -1, self.model.tri_body.numpy()[entered])
+        anew = (first <= own) & (own <= last) | (first <= into) & (into <= last)
+        self._entered.assign(np.where(anew, np.int32(-1), entered))
+        self._deep.assign(np.where(anew, np.int32(0), deep))
+        wp.copy(self._last, x)
+
+    def _refit(self, x0: wp.array, x: wp.array) -> tuple[wp.Bvh, wp.Bvh, wp.Bvh]:
+        """Trees over the ways of bodies and triangles from x0 to x, and over the tets at x."""
+        model = self.model
+        if self._bvhs is None:
+            sizes = model.n_body, model.n_tri, model.n_tet
+            self._boxes = [(wp.zeros(n, dtype=wp.vec3), wp.zeros(n, dtype=wp.vec3)) for n in sizes]
+            self._skin = wp.zeros(model.n_body, dtype=float)
+        of_body, of_tri, of_tet = (list(box) for box in self._boxes)
+        wp.launch(bounds.clear_boxes, dim=model.n_body, inputs=[], outputs=of_body)
+        for place in (x0, x):
+            wp.launch(
+                bounds.body_boxes,
+                dim=-(-model.n_surf // int(bounds.CHUNK)),
+                inputs=[model.surf, model.vert_body, self._skin, place],
+                outputs=of_body,
+            )
+        ways = [model.tris, model.tri_body, model.body_edge, x0, x]
+        wp.launch(tunnelling.triangle_paths, dim=model.n_tri, inputs=ways, outputs=of_tri)
+        wp.launch(kernels.tet_boxes, dim=model.n_tet, inputs=[model.tets, x], outputs=of_tet)
+        if self._bvhs is None:
+            vert_body = model.vert_body.numpy()
+            world = model.body_world.numpy()[vert_body[self._tets[:, 0]]]
+            groups = model.body_world, model.tri_body, wp.array(world, dtype=int)
+            self._bvhs = tuple(
+                wp.Bvh(*box, groups=group) for box, group in zip(self._boxes, groups, strict=True)
+            )
+        for bvh in self._bvhs:
+            bvh.refit()
+        return self._bvhs
+
+    @staticmethod
+    def _n(work: Work) -> int:
+        return int(work.contacts.n.numpy()[0])

@@ -1,0 +1,139 @@
+"""Constitutive models: what the user names, and the parameters the kernels read.
+
+A model is one kernel file (``warp_contact/kernels/<model>.py``) and one class here with
+
+* ``kernels``: that file; it provides the kernels ``set_forces``, ``apply_stiffness``,
+  ``apply_damping`` and ``energies``, each with one signature for all models but for ``param``, an
+  array of ``ROW``: the type of a row of parameters, a Warp vector, or ``float`` for two dimensions;
+* ``density`` [kg/m^3] and ``damping`` [s];
+* ``parameters(vertices, tets)``: one row per tet, in the order in which the kernels read it;
+* ``check()``: raises ValueError with a reason.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from numbers import Real
+from types import ModuleType
+from typing import ClassVar
+
+import numpy as np
+
+from warp_contact.kernels.elastic import corotated, neo_hookean, springs
+from warp_contact.scene.topology import EDGES
+
+FACES = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))  # opposite to corners 0, 1, 2, 3
+
+
+def _check_common(material) -> None:
+    for field in fields(material):
+        value = getattr(material, field.name)
+        if not isinstance(value, Real):
+            raise ValueError(f"{field.name} {value!r} is not a number")
+        if not math.isfinite(value):
+            raise ValueError(f"{field.name} must be finite, not {value}")
+    if material.density <= 0.0:
+        raise ValueError(f"density must be positive, not {material.density} kg/m^3")
+    if material.damping < 0.0:
+        raise ValueError(f"damping must not be negative, not {material.damping} s")
+
+
+@dataclass(frozen=True)
+class _Solid:
+    """Isotropic solid.
+
+    Attributes:
+        youngs_modulus: [Pa]
+        poisson_ratio: [-], between -1 and 0.5
+        density: [kg/m^3]
+        damping: time beta [s] of stiffness-proportional damping; a mode of angular frequency w
+            is damped by the ratio beta w / 2
+    """
+
+    youngs_modulus: float
+    poisson_ratio: float
+    density: float
+    damping: float = 0.0
+
+    def check(self) -> None:
+        """Raise ValueError where the numbers make no material."""
+        _check_common(self)
+        if self.youngs_modulus <= 0.0:
+            raise ValueError(f"youngs_modulus must be positive, not {self.youngs_modulus} Pa")
+        if not -1.0 < self.poisson_ratio < 0.5:
+            raise ValueError(f"poisson_ratio must be within (-1, 0.5), not {self.poisson_ratio}")
+
+    def lame(self) -> tuple[float, float]:
+        """Return mu and lambda [Pa] of small strain."""
+        e, nu = self.youngs_modulus, self.poisson_ratio
+        return e / (2.0 * (1.0 + nu)), e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+
+    def parameters(self, vertices: np.ndarray, tets: np.ndarray) -> np.ndarray:
+        """Return (mu [Pa], lambda [Pa], beta [s]) of each tet, shape (n, 3)."""
+        row = np.array([*self.lame(), self.damping], dtype=np.float32)
+        return np.tile(row, (len(tets), 1))
+
+
+@dataclass(frozen=True)
+class NeoHookean(_Solid):
+    __doc__ = f"Stable neo-Hookean: {_Solid.__doc__}"
+    kernels: ClassVar[ModuleType] = neo_hookean
+
+
+@dataclass(frozen=True)
+class Corotated(_Solid):
+    __doc__ = f"Fixed corotated: {_Solid.__doc__}"
+    kernels: ClassVar[ModuleType] = corotated
+
+
+@dataclass(frozen=True)
+class SpringNetwork:
+    """Springs on tet edges, surface triangles and tets; each stores k C^2 / 2 at strain C.
+
+    The constants belong to one spring, so a finer mesh of the same body is stiffer.
+
+    Attributes:
+        distance: energy k of each tet edge [J]
+        area: energy k of each surface triangle [J]
+        volume: energy k of each tet [J]
+        density: [kg/m^3]
+        damping: time beta [s] of stiffness-proportional damping
+    """
+
+    distance: float
+    area: float
+    volume: float
+    density: float
+    damping: float = 0.0
+    kernels: ClassVar[ModuleType] = springs
+
+    def check(self) -> None:
+        """Raise ValueError where the numbers make no material."""
+        _check_common(self)
+        for name in ("distance", "area", "volume"):
+            if getattr(self, name) < 0.0:
+                raise ValueError(f"{name} must not be negative, not {getattr(self, name)} J")
+
+    def parameters(self, vertices: np.ndarray, tets: np.ndarray) -> np.ndarray:
+        """Return the row described in ``elastic/springs.py`` for each tet, shape (n, 22)."""
+        x = np.asarray(vertices, dtype=np.float64)[np.asarray(tets)]  # (n, 4, 3)
+        d = np.stack([x[:, j] - x[:, i] for i, j in EDGES], axis=1)
+        abc = np.stack([x[:, face] for face in map(list, FACES)], axis=1)  # (n, 4, 3, 3)
+        normal = np.cross(abc[:, :, 1] - abc[:, :, 0], abc[:, :, 2] - abc[:, :, 0])
+        shared = _multiplicity(tets, FACES) > 1
+        row = [
+            self.distance / _multiplicity(tets, EDGES),
+            np.linalg.norm(d, axis=-1),
+            np.where(shared, 0.0, self.area),
+            0.5 * np.linalg.norm(normal, axis=-1),
+            np.full((len(tets), 1), self.volume),
+            np.full((len(tets), 1), self.damping),
+        ]
+        return np.concatenate(row, axis=1).astype(np.float32)
+
+
+def _multiplicity(tets: np.ndarray, parts: tuple) -> np.ndarray:
+    """Number of tets that share each edge or face of each tet, shape (n, len(parts))."""
+    ids = np.sort(np.asarray(tets)[:, np.array(parts)], axis=-1)
+    rows = ids.reshape(-1, ids.shape[-1])
+    _, inverse, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
+    return count[inverse.ravel()].reshape(len(tets), len(parts))

@@ -1,0 +1,70 @@
+"""Where bodies are placed, and where there is no simulation to start from."""
+
+import numpy as np
+
+from warp_contact.kernels.narrow_phase.gap import REST
+
+ROUNDING = 2.0**-24  # of a float32, at most
+DROWNED = 10.0  # gaps at rest, by which rounding may move a body: soft ones take it
+SAME = 1e-3  # of an edge: surfaces nearer than this to each other do not show an overlap to search
+
+
+def check(bodies: list) -> None:
+    """Every body of a scene by itself and every two.
+
+    Raises:
+        ValueError: naming a body that is so far from the origin that rounding moves it by
+            ``DROWNED`` gaps at rest, or two of one world, not both fixed, that fill the same space:
+            neither is inside the other, and no direction leads out
+    """
+    edges = [_mean_edge(body) for body in bodies]
+    for body, edge in zip(bodies, edges, strict=True):
+        far, most = float(np.abs(body.x).max()), DROWNED * REST * edge / ROUNDING
+        if far > most:
+            raise ValueError(
+                f"body '{body.label}' is {far:.4g} m from the origin: beyond {most:.4g} m, "
+                f"rounding is {DROWNED:g} times its gap at rest; place the scene about the origin"
+            )
+    shape = np.array([_shape(body) for body in bodies])
+    slack = SAME * np.array(edges)
+    world = np.array([body.world for body in bodies])
+    held = np.array([bool(np.all(body.fixed)) for body in bodies])
+    mix = np.sqrt(np.arange(2.0, 2.0 + shape.shape[1]))
+    along, reach = shape @ mix, slack.max() * mix.sum()  # like shapes are near each other along it
+    order = np.lexsort((along, world))
+    for k in range(1, len(bodies)):
+        p, q = order[:-k], order[k:]
+        near = (world[p] == world[q]) & (along[q] - along[p] <= reach)
+        if not near.any():
+            return
+        same = near & (np.abs(shape[p] - shape[q]).max(axis=1) <= np.minimum(slack[p], slack[q]))
+        same &= ~(held[p] & held[q])
+        if same.any():
+            a, b = sorted((int(p[same.argmax()]), int(q[same.argmax()])))
+            raise ValueError(
+                f"body '{bodies[a].label}' and body '{bodies[b].label}' are in exactly the same "
+                f"place: no direction leads out; move one of them"
+            )
+
+
+def _shape(body) -> np.ndarray:
+    """Lengths [m] that tell a placed body from others: its box, middle and six radii, shape (15,).
+
+    The radii are the root mean squares of the distances of its points from six planes through its
+    middle, those of the axes and of the diagonals.
+    """
+    corner = body.x[body.mesh.tets]
+    weight = body.mesh.volumes / body.mesh.volume
+    middle = weight @ corner.mean(axis=1)
+    r = corner - middle
+    total = r.sum(axis=1)
+    square = np.einsum("m,mki,mkj->ij", weight, r, r)
+    square += np.einsum("m,mi,mj->ij", weight, total, total)
+    n = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
+    radius = np.sqrt(np.einsum("ai,ij,aj->a", n, square / 20.0, n))
+    return np.concatenate([body.x.min(axis=0), body.x.max(axis=0), middle, radius])
+
+
+def _mean_edge(body) -> float:
+    p, q = body.mesh.edges.T
+    return float(np.linalg.norm(body.mesh.vertices[p] - body.mesh.vertices[q], axis=1).mean())

@@ -1,0 +1,1 @@
+"""One time step: what is captured. Nothing here reads back or allocates."""

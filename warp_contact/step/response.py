@@ -1,0 +1,56 @@
+"""How bodies answer to an overlap: what ``Simulation(response=...)`` takes."""
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ContactSurface:
+    """The contact surface method of Spillmann & Teschner (2005); no stiffness to choose.
+
+    Attributes:
+        search: ``balanced`` solves for equal pressures on both sides at once; ``literal`` is the
+            paper as printed: each vertex bisects for itself, displacement before velocities
+        iterations: force evaluations of the search in a step
+    """
+
+    search: str = "balanced"
+    iterations: int = 4
+
+    def __post_init__(self):
+        """Raise ValueError for an unknown search or a number of iterations below 2."""
+        if self.search not in ("balanced", "literal"):
+            raise ValueError(f"search '{self.search}' is neither 'balanced' nor 'literal'")
+        if int(self.iterations) != self.iterations or self.iterations < 2:
+            raise ValueError(f"iterations {self.iterations} is not a count of 2 or more")
+
+
+@dataclass(frozen=True)
+class Penalty:
+    """A force proportional to the penetration depth (Heidelberger et al. 2004).
+
+    Attributes:
+        stiffness: force per depth of each contact [N/m]
+        damping: force per normal velocity of each contact [N s/m]
+    """
+
+    stiffness: float
+    damping: float = 0.0
+
+    def __post_init__(self):
+        """Raise ValueError unless stiffness > 0 and damping >= 0."""
+        if not (math.isfinite(self.stiffness) and self.stiffness > 0.0):
+            raise ValueError(f"penalty stiffness {self.stiffness} is not positive")
+        if not (math.isfinite(self.damping) and self.damping >= 0.0):
+            raise ValueError(f"penalty damping {self.damping} is negative")
+
+
+@dataclass(frozen=True)
+class PredictedForce:
+    """Forces that close the overlaps predicted for the end of the step; nothing to choose.
+
+    After Spillmann, Becker & Teschner, "Non-iterative computation of contact forces for deformable
+    objects" (WSCG 2007): one pass over the contacts, without iteration, search or closure. It is a
+    reconstruction from the idea, not from the formulas of the paper; those used here stand in
+    ``impulse/predicted.py``.
+    """

@@ -1,0 +1,1 @@
+"""USD stages: written frame by frame, read and checked."""

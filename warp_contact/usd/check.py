@@ -1,0 +1,152 @@
+"""Checks of a USD file: the registered validators, and what they do not look at."""
+
+import numpy as np
+from pxr import Tf, Usd, UsdGeom, UsdUtils, Vt
+
+from warp_contact.usd.reader import frame_numbers, open_stage, read_note
+
+TOPOLOGY = (
+    "faceVertexCounts",
+    "faceVertexIndices",
+    "tetVertexIndices",
+    "surfaceFaceVertexIndices",
+    "subdivisionScheme",
+)
+DEFAULT = Usd.TimeCode.Default()
+EXTENT_ERROR = 1e-6  # of the largest coordinate: float32 in another order of operations
+
+
+def problems(path) -> list[str]:
+    """What is wrong with a USD file or an open stage, one line each; empty if nothing is."""
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()  # collects what USD would print
+    try:
+        stage = path if isinstance(path, Usd.Stage) else open_stage(path)
+        found = metadata(stage)
+        for prim in stage.Traverse():
+            if prim.IsA(UsdGeom.PointBased):
+                found += [f"{prim.GetPath()}: {line}" for line in point_based(stage, prim)]
+        found += [d.commentary for d in delegate.TakeUncoalescedDiagnostics()]
+        # Only afterwards: the validators take the template of the clips for a lost file and warn.
+        found += registered(stage)
+    except (OSError, Tf.ErrorException) as error:
+        found = [str(error)]
+    finally:
+        delegate.TakeUncoalescedDiagnostics()
+    return [" ".join(line.split()) for line in dict.fromkeys(found)]
+
+
+def registered(stage: Usd.Stage) -> list[str]:
+    """The errors of the validators that ship with USD, where this USD has them."""
+    try:
+        from pxr import UsdValidation
+    except ImportError:
+        return []
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    errors = UsdValidation.ValidationContext(validators).Validate(stage)
+    kind = UsdValidation.ValidationErrorType.Error
+    return [f"{e.GetName()}: {e.GetMessage()}" for e in errors if e.GetType() == kind]
+
+
+def metadata(stage: Usd.Stage) -> list[str]:
+    """Units, axes, rates and range, which only count on the root layer."""
+    root, found = stage.GetRootLayer(), []
+    wanted = {"upAxis": "Z", "metersPerUnit": 1.0, "kilogramsPerUnit": 1.0}
+    for key, value in wanted.items():
+        if root.pseudoRoot.GetInfo(key) != value or not root.pseudoRoot.HasInfo(key):
+            found.append(f"root layer: {key} is not {value}")
+    if not (root.HasTimeCodesPerSecond() and root.timeCodesPerSecond > 0.0):
+        found.append("root layer: no timeCodesPerSecond")
+    if not root.HasFramesPerSecond() or root.framesPerSecond != root.timeCodesPerSecond:
+        found.append("root layer: framesPerSecond is not timeCodesPerSecond")
+    if not (root.HasStartTimeCode() and root.HasEndTimeCode()):
+        found.append("root layer: no startTimeCode or endTimeCode")
+    elif root.endTimeCode < root.startTimeCode:
+        found.append("root layer: endTimeCode is before startTimeCode")
+    if not stage.GetDefaultPrim():
+        found.append("root layer: no defaultPrim")
+    return found
+
+
+def point_based(stage: Usd.Stage, prim: Usd.Prim) -> list[str]:
+    """Samples, points, extents, primvars and topology of a Mesh or a TetMesh."""
+    frames = [float(frame) for frame in frame_numbers(stage)]
+    geometry = UsdGeom.PointBased(prim)
+    sampled = [a for a in prim.GetAuthoredAttributes() if a.GetTimeSamples()]
+    found = [f"{a.GetName()} is time-sampled" for a in sampled if a.GetName() in TOPOLOGY]
+    for attribute in sampled:
+        times = attribute.GetTimeSamples()
+        if times != frames:
+            line = f"{attribute.GetName()} has {len(times)} samples for {len(frames)} frames"
+            found.append(line)
+    times = geometry.GetPointsAttr().GetTimeSamples()
+    moving = prim.IsA(UsdGeom.Mesh) and read_note(prim.GetParent(), "body") is not None
+    if moving and not times and len(frames) > 1:
+        found.append(f"points has no samples for {len(frames)} frames")
+    n = len(geometry.GetPointsAttr().Get(times[0] if times else DEFAULT) or ())
+    primvars = UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()
+    lengths, wanted = sizes(prim, n), []
+    for primvar in primvars:
+        size = lengths.get(primvar.GetInterpolation())
+        if size is not None and primvar.GetTypeName().isArray:
+            wanted.append((primvar, size))
+    for time in times or [DEFAULT]:
+        when = "" if time == DEFAULT else f" at frame {time:g}"
+        found += [line + when for line in at_time(geometry, time, n, wanted)]
+    return found + (tet_mesh(prim, n) if prim.IsA(UsdGeom.TetMesh) else mesh(prim, n))
+
+
+def at_time(geometry: UsdGeom.PointBased, time, n: int, primvars: list) -> list[str]:
+    """What is wrong at one time with ``n`` points, their extent, and primvars of given sizes."""
+    points = geometry.GetPointsAttr().Get(time)
+    if points is None or len(points) != n or n == 0:
+        return [f"{0 if points is None else len(points)} points instead of {n or 'some'}"]
+    if not np.isfinite(np.asarray(points)).all():
+        return ["points are not finite"]
+    found, extent = [], geometry.GetExtentAttr().Get(time)
+    expected = np.asarray(UsdGeom.PointBased.ComputeExtent(points))
+    error = EXTENT_ERROR * float(np.abs(expected).max())
+    if extent is None or np.abs(np.asarray(extent) - expected).max(initial=0.0) > error:
+        found.append("extent is not that of the points")
+    for primvar, size in primvars:
+        value = primvar.ComputeFlattened(time) if primvar.IsIndexed() else primvar.Get(time)
+        length = 0 if value is None else len(value)
+        if length != size * primvar.GetElementSize():
+            found.append(
+                f"primvar {primvar.GetPrimvarName()} has {length} values instead of {size}"
+            )
+    return found
+
+
+def sizes(prim: Usd.Prim, n: int) -> dict[str, int]:
+    """Length that a primvar of each interpolation must have; those not listed are not checked."""
+    result = {UsdGeom.Tokens.vertex: n, UsdGeom.Tokens.varying: n, UsdGeom.Tokens.constant: 1}
+    if prim.IsA(UsdGeom.Mesh):
+        counts = UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get() or ()
+        result[UsdGeom.Tokens.uniform] = len(counts)
+        result[UsdGeom.Tokens.faceVarying] = int(np.sum(counts))
+    return result
+
+
+def mesh(prim: Usd.Prim, n: int) -> list[str]:
+    """Faces of a Mesh with ``n`` points."""
+    if not prim.IsA(UsdGeom.Mesh):
+        return []
+    geometry = UsdGeom.Mesh(prim)
+    indices = geometry.GetFaceVertexIndicesAttr().Get() or Vt.IntArray()
+    counts = geometry.GetFaceVertexCountsAttr().Get() or Vt.IntArray()
+    valid, reason = UsdGeom.Mesh.ValidateTopology(indices, counts, n)
+    return [] if valid else [reason or "its faces do not fit its points"]
+
+
+def tet_mesh(prim: Usd.Prim, n: int) -> list[str]:
+    """Tets and surface of a TetMesh with ``n`` points."""
+    geometry, found = UsdGeom.TetMesh(prim), []
+    for name in "tetVertexIndices", "surfaceFaceVertexIndices":
+        ids = np.asarray(prim.GetAttribute(name).Get() or ()).ravel()
+        if ids.size == 0 or ids.min() < 0 or ids.max() >= n:
+            found.append(f"{name} is empty or does not fit its {n} points")
+    if not found:
+        inverted = UsdGeom.TetMesh.FindInvertedElements(geometry, DEFAULT)
+        if len(inverted):
+            found.append(f"{len(inverted)} inverted tets at rest, the first is {inverted[0]}")
+    return found

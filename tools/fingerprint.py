@@ -1,12 +1,16 @@
 """One hash for each of some short runs that together reach every kernel of a simulation.
 
-    python tools/fingerprint.py [run ...] [--out FILE] [--against FILE] [--reach]
+    python tools/fingerprint.py [run ...] [--out FILE] [--against FILE] [--reach] [--contracted]
 
 A hash is of positions, velocities, contact forces and contact fields after every frame, to the last
 bit: a change that is meant to change nothing leaves all of them as they were, and one that is meant
 to change something says which. Bits depend on the processor and on the version of Warp, so compare
 on one machine only: ``--out`` writes the hashes, ``--against`` compares with those of a file, and
 the exit status is 1 when any differs. ``--reach`` prints which kernels no run has launched.
+
+Kernels are compiled so that each product and each sum is rounded by itself. As simulations run them
+(``--contracted``) the compiler contracts products and sums as it sees fit, which depends on how the
+arrays lie in memory: the same formulas on the same numbers then round in another way.
 """
 
 import argparse
@@ -240,6 +244,16 @@ RUNS: dict[str, Callable[[Trace], None]] = {
 }
 
 
+def round_each_operation() -> None:
+    """Compile all kernels without contraction of products and sums."""
+    for name in [name for name in sys.modules if name.startswith("warp_contact.kernels.")]:
+        if any(isinstance(value, wp.Kernel) for value in vars(sys.modules[name]).values()):
+            module = wp.get_module(name)
+            flags = module.options["cpu_compiler_flags"]
+            module.options["cpu_compiler_flags"] = flags.replace("contract=fast", "contract=off")
+            module.mark_modified()
+
+
 def fingerprints(names: list[str]) -> Iterator[tuple[str, str]]:
     """The hash of each run, as it ends."""
     for name in names:
@@ -287,11 +301,14 @@ def main() -> int:
     parser.add_argument("--out", metavar="FILE", help="write the hashes there too")
     parser.add_argument("--against", metavar="FILE", help="compare with the hashes of a file")
     parser.add_argument("--reach", action="store_true", help="name kernels that no run launched")
+    parser.add_argument("--contracted", action="store_true", help="compile as simulations do")
     args = parser.parse_args()
     unknown = set(args.runs) - set(RUNS)
     if unknown:
         parser.error(f"no run {', '.join(sorted(unknown))}; there are {', '.join(RUNS)}")
     wp.config.log_level = wp.LOG_WARNING
+    if not args.contracted:
+        round_each_operation()
     before = {}
     if args.against:
         lines = Path(args.against).read_text(encoding="utf-8").splitlines()

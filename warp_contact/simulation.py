@@ -141,10 +141,10 @@ class Simulation:
         if not np.isfinite(part).all():
             raise ValueError(f"{of} are not finite")
         with wp.ScopedDevice(self.device):
-            self._meter.follow(self.state.x)
+            self._meter.tunnelling.follow(self.state.x)
             self.state.x.assign(x)
             own = self.model.vert_body.numpy()[self._range(body)]
-            self._meter.jump(self.state.x, own[0], own[-1])
+            self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
             self._stepper.look_anew()
 
     def set_velocity(self, body: Body | int, velocity, vertices=None) -> None:
@@ -175,9 +175,7 @@ class Simulation:
         with wp.ScopedDevice(self.device):
             duration = 1.0 / self.fps if self.frame else 0.0
             dt = duration / max(self.substeps, 1)
-            return self._meter.measure(
-                self.state, self._stepper.work, self._stepper.unit, duration, dt
-            )
+            return self._meter.measure(self.state, self._stepper.work, duration, dt)
 
     def contact_fields(self) -> dict[str, np.ndarray]:
         """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
@@ -198,7 +196,7 @@ class Simulation:
         with wp.ScopedDevice(self.device):
             values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
             values |= {"frame": np.array(self.frame)} | self._stepper.values()
-            values |= {f"meter.{k}": value for k, value in self._meter.memory().items()}
+            values |= {f"meter.{k}": value for k, value in self._meter.tunnelling.memory().items()}
         checkpoint.write(path, self._fingerprint(), values)
 
     def load(self, path: str | os.PathLike) -> None:
@@ -214,7 +212,7 @@ class Simulation:
             self.state.v.assign(values["v"])
             self._stepper.restore(values)
             self._meter = Meter(self.model)
-            self._meter.remember(checkpoint.part(values, "meter"))
+            self._meter.tunnelling.remember(checkpoint.part(values, "meter"))
         self.frame = int(values["frame"])
 
     def _fingerprint(self) -> str:

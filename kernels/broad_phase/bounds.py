@@ -1,4 +1,4 @@
-"""Boxes around bodies and triangles, grown by the skin of margins.py to last as long as these.
+"""Boxes around bodies and triangles, grown by the skin of skins.py to last as long as these.
 
 Minimum and maximum do not depend on the order of their arguments, so atomics repeat bit for bit.
 """

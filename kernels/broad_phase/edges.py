@@ -9,6 +9,7 @@ from warp_contact.kernels.broad_phase.bounds import next_in
 from warp_contact.kernels.broad_phase.near import MANY, Near, is_near, part, reaches
 from warp_contact.kernels.broad_phase.pairs import append
 from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -64,10 +65,7 @@ def gap_to(p: wp.vec3, q: wp.vec3, t: wp.vec3i, enough: float, x: wp.array[wp.ve
 def visit_edges(
     # in
     skin: wp.array[float],  # (n_body,) [m]
-    surface: wp.uint64,  # Bvh over the triangles, grouped by body
-    tris: wp.array[wp.vec3i],  # (n_tri,)
-    edges: wp.array[wp.vec4i],  # (n_edge,)
-    vert_body: wp.array[int],  # (n_vert,)
+    mesh: Mesh,
     of: Near,
     near_tri: wp.array[int],  # (capacity,) of near.py
     lower: wp.array[wp.vec3],  # (n_tri,) boxes of the triangles [m]
@@ -80,21 +78,22 @@ def visit_edges(
 ):
     """One thread per surface edge: the triangles that it may come to cross."""
     e = wp.tid()
-    m = vert_body[edges[e][0]]
+    m = mesh.vert_body[mesh.edges[e][0]]
     if of.n_near[m] == 0:
         return
-    p = x[edges[e][0]]
-    q = x[edges[e][1]]
+    p = x[mesh.edges[e][0]]
+    q = x[mesh.edges[e][1]]
     own = part(p, p, q, q, skin[m])
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
             reach = skin[m] + skin[of.near[m, k]]
             if reaches(own, of.slab[m, k]):
-                if boxes_meet(own.lo, own.hi, of.tri_lower[m, k], of.tri_upper[m, k]):
-                    for c in range(of.tris[m, k][0], of.tris[m, k][1]):
+                other = of.part[m, k]
+                if boxes_meet(own.lo, own.hi, other.tri_lower, other.tri_upper):
+                    for c in range(other.tris[0], other.tris[1]):
                         t = near_tri[c]
                         if boxes_meet(own.lo, own.hi, lower[t], upper[t]):
-                            if gap_to(p, q, tris[t], reach, x) <= reach:
+                            if gap_to(p, q, mesh.tris[t], reach, x) <= reach:
                                 append(e, t, found, n_found)
     else:
         world = of.world[m]
@@ -103,9 +102,9 @@ def visit_edges(
             if is_near(m, body, own, of):
                 reach = skin[m] + skin[body]
                 t = int(0)
-                root = wp.bvh_get_group_root(surface, body)
-                query = wp.bvh_query_aabb(surface, own.lo, own.hi, root)
+                root = wp.bvh_get_group_root(mesh.bvh, body)
+                query = wp.bvh_query_aabb(mesh.bvh, own.lo, own.hi, root)
                 while wp.bvh_query_next(query, t):
-                    if gap_to(p, q, tris[t], reach, x) <= reach:
+                    if gap_to(p, q, mesh.tris[t], reach, x) <= reach:
                         append(e, t, found, n_found)
             body = next_in(of.bodies, world, own.lo, own.hi, body)

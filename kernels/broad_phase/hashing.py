@@ -4,7 +4,7 @@ Teschner et al. 2003: cell (i, j, k) = floor(x / l), l the mean edge length, and
 hash = (i 73856093 xor j 19349663 xor k 83492791) mod n, here with the body mixed in: a tet looks
 for the vertices of one near body at a time. Vertices are inserted by a counting sort, with their
 true cell, so that a collision of hashes costs a comparison and nothing else. Each tet then visits
-the cells around it. What it finds within two skins (margins.py) is sorted by pairs.py. A
+the cells around it. What it finds within two skins (skins.py) is sorted by pairs.py. A
 half-space counts as a body with one tet.
 """
 
@@ -13,6 +13,7 @@ import warp as wp
 from warp_contact.kernels.broad_phase.near import MANY, Near, any_near, is_near, part, reaches
 from warp_contact.kernels.broad_phase.pairs import append
 from warp_contact.kernels.geometry import boxes_meet, in_box
+from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -109,9 +110,7 @@ def visit_cells(
     lo: wp.vec3,
     hi: wp.vec3,
     reach: float,
-    tets: wp.array[wp.vec4i],
-    vert_body: wp.array[int],
-    body_vert: wp.array[int],
+    mesh: Mesh,
     cell_start: wp.array[int],
     cell_vert: wp.array[int],
     x: wp.array[wp.vec3],
@@ -122,13 +121,13 @@ def visit_cells(
 
     Where the box has more cells than the body has vertices, these are tried one by one.
     """
-    a = x[tets[q][0]]
-    b = x[tets[q][1]]
-    c = x[tets[q][2]]
-    d = x[tets[q][3]]
+    a = x[mesh.tets[q][0]]
+    b = x[mesh.tets[q][1]]
+    c = x[mesh.tets[q][2]]
+    d = x[mesh.tets[q][3]]
     n = (hi - lo) / size + wp.vec3(1.0, 1.0, 1.0)
-    if not n[0] * n[1] * n[2] <= float(body_vert[m + 1] - body_vert[m]):  # or not finite
-        for i in range(body_vert[m], body_vert[m + 1]):
+    if not n[0] * n[1] * n[2] <= float(mesh.body_vert[m + 1] - mesh.body_vert[m]):  # or not finite
+        for i in range(mesh.body_vert[m], mesh.body_vert[m + 1]):
             if in_box(x[i], lo, hi) and may_hold(x[i], a, b, c, d, reach):
                 append(i, q, found, n_found)
         return
@@ -141,7 +140,7 @@ def visit_cells(
                 h = hash_of(cell, m, cell_start.shape[0] - 1)
                 for e in range(cell_start[h], cell_start[h + 1]):
                     i = cell_vert[e]
-                    if vert_body[i] == m and in_box(x[i], lo, hi):
+                    if mesh.vert_body[i] == m and in_box(x[i], lo, hi):
                         if cell_of(x[i], size) == cell and may_hold(x[i], a, b, c, d, reach):
                             append(i, q, found, n_found)
 
@@ -151,9 +150,7 @@ def visit_tets(
     # in
     size: float,  # edge of a cell [m]
     skin: wp.array[float],  # (n_body,) [m]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    vert_body: wp.array[int],  # (n_vert,)
-    body_vert: wp.array[int],  # (n_body + 1,)
+    mesh: Mesh,
     of: Near,
     cell_start: wp.array[int],  # (n_cell + 1,)
     cell_vert: wp.array[int],  # (n_vert,)
@@ -165,37 +162,37 @@ def visit_tets(
 ):
     """One thread per tet: the vertices of other bodies that it may come to hold."""
     q = wp.tid()
-    m = vert_body[tets[q][0]]
+    m = mesh.vert_body[mesh.tets[q][0]]
     if of.n_near[m] == 0:
         return
-    own = part(x[tets[q][0]], x[tets[q][1]], x[tets[q][2]], x[tets[q][3]], skin[m])
+    t = mesh.tets[q]
+    own = part(x[t[0]], x[t[1]], x[t[2]], x[t[3]], skin[m])
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
             if reaches(own, of.slab[m, k]):
-                if boxes_meet(own.lo, own.hi, of.vert_lower[m, k], of.vert_upper[m, k]):
+                other = of.part[m, k]
+                if boxes_meet(own.lo, own.hi, other.vert_lower, other.vert_upper):
                     body = of.near[m, k]
                     grow = wp.vec3(skin[body], skin[body], skin[body])
-                    lo = wp.max(own.lo - grow, of.vert_lower[m, k])
-                    hi = wp.min(own.hi + grow, of.vert_upper[m, k])
+                    lo = wp.max(own.lo - grow, other.vert_lower)
+                    hi = wp.min(own.hi + grow, other.vert_upper)
                     reach = skin[m] + skin[body]
                     visit_cells(
-                        q, body, size, lo, hi, reach, tets, vert_body, body_vert, cell_start,
-                        cell_vert, x, found, n_found
-                    )  # fmt: skip
+                        q, body, size, lo, hi, reach, mesh, cell_start, cell_vert, x, found, n_found
+                    )
     else:
-        other = int(0)
+        body = int(0)
         root = wp.bvh_get_group_root(of.bodies, of.world[m])
         query = wp.bvh_query_aabb(of.bodies, own.lo, own.hi, root)
-        while wp.bvh_query_next(query, other):
-            if is_near(m, other, own, of):
-                grow = wp.vec3(skin[other], skin[other], skin[other])
-                lo = wp.max(own.lo - grow, of.lower[other])
-                hi = wp.min(own.hi + grow, of.upper[other])
-                reach = skin[m] + skin[other]
+        while wp.bvh_query_next(query, body):
+            if is_near(m, body, own, of):
+                grow = wp.vec3(skin[body], skin[body], skin[body])
+                lo = wp.max(own.lo - grow, of.lower[body])
+                hi = wp.min(own.hi + grow, of.upper[body])
+                reach = skin[m] + skin[body]
                 visit_cells(
-                    q, other, size, lo, hi, reach, tets, vert_body, body_vert, cell_start,
-                    cell_vert, x, found, n_found
-                )  # fmt: skip
+                    q, body, size, lo, hi, reach, mesh, cell_start, cell_vert, x, found, n_found
+                )
 
 
 @wp.kernel

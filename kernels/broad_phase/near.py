@@ -9,6 +9,7 @@ others, such as the floor of a pile, lists none of them: its parts ask the Bvh o
 import warp as wp
 
 from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -130,39 +131,40 @@ def reaches(p: Part, slab: wp.vec4) -> bool:
 
 
 @wp.struct
+class NearPart:
+    """What of a near body reaches into the slab of the own one."""
+
+    vert_lower: wp.vec3  # box of the vertices [m]
+    vert_upper: wp.vec3
+    tri_lower: wp.vec3  # box of the triangles [m]
+    tri_upper: wp.vec3
+    tris: wp.vec2i  # first and end of these triangles in a list
+
+
+@wp.struct
 class Near:
     """Where to look for the bodies near a body; lists have the shape (n_body, MANY)."""
 
     bodies: wp.uint64  # Bvh over the boxes, grouped by world
-    world: wp.array(dtype=int)
-    lower: wp.array(dtype=wp.vec3)  # boxes of the bodies [m]
-    upper: wp.array(dtype=wp.vec3)
-    n_near: wp.array(dtype=int)
-    near: wp.array2d(dtype=int)
-    slab: wp.array2d(dtype=wp.vec4)  # axis, and where the near body begins along it [m]
-    end: wp.array2d(dtype=float)  # where the own body ends along it [m]
-    vert_lower: wp.array2d(dtype=wp.vec3)  # box of the near body's vertices up to there [m]
-    vert_upper: wp.array2d(dtype=wp.vec3)
-    tri_lower: wp.array2d(dtype=wp.vec3)  # box of its triangles up to there [m]
-    tri_upper: wp.array2d(dtype=wp.vec3)
-    tris: wp.array2d(dtype=wp.vec2i)  # first and end of these triangles in a list
+    world: wp.array[int]  # (n_body,)
+    lower: wp.array[wp.vec3]  # (n_body,) boxes of the bodies [m]
+    upper: wp.array[wp.vec3]  # (n_body,)
+    n_near: wp.array[int]  # (n_body,) MANY + 1 for a body without a list
+    near: wp.array2d[int]  # ascending
+    slab: wp.array2d[wp.vec4]  # axis, and where the near body begins along it [m]
+    end: wp.array2d[float]  # where the own body ends along it [m]
+    part: wp.array2d[NearPart]  # of the near body, up to there
 
 
 @wp.kernel
 def near_parts(
     # in
     skin: wp.array[float],  # (n_body,) [m]
-    surface: wp.uint64,  # Bvh over the triangles, grouped by body
-    body_vert: wp.array[int],  # (n_body + 1,)
-    tris: wp.array[wp.vec3i],  # (n_tri,)
-    of: Near,
+    mesh: Mesh,
+    of: Near,  # without the parts
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
-    vert_lower: wp.array2d[wp.vec3],  # (n_body, MANY) [m]
-    vert_upper: wp.array2d[wp.vec3],  # (n_body, MANY) [m]
-    tri_lower: wp.array2d[wp.vec3],  # (n_body, MANY) [m]
-    tri_upper: wp.array2d[wp.vec3],  # (n_body, MANY) [m]
-    range_of: wp.array2d[wp.vec2i],  # (n_body, MANY) first and end in ``near_tri``
+    part_of: wp.array2d[NearPart],  # (n_body, MANY)
     near_tri: wp.array[int],  # (capacity,)
     # out, added to
     count: wp.array[int],  # (1,)
@@ -178,28 +180,28 @@ def near_parts(
     grow = wp.vec3(own, own, own)
     lo = wp.vec3(1.0e30, 1.0e30, 1.0e30)
     hi = -lo
-    if body_vert[body + 1] - body_vert[body] > LARGE:
+    if mesh.body_vert[body + 1] - mesh.body_vert[body] > LARGE:
         lo = of.lower[body]
         hi = of.upper[body]
     else:
-        for i in range(body_vert[body], body_vert[body + 1]):
+        for i in range(mesh.body_vert[body], mesh.body_vert[body + 1]):
             if reaches(part(x[i], x[i], x[i], x[i], own), back):
                 lo = wp.min(lo, x[i] - grow)
                 hi = wp.max(hi, x[i] + grow)
-    vert_lower[m, k] = lo
-    vert_upper[m, k] = hi
+    out = NearPart()
+    out.vert_lower = lo
+    out.vert_upper = hi
     lo = wp.vec3(1.0e30, 1.0e30, 1.0e30)
     hi = -lo
-    range_of[m, k] = wp.vec2i(0, 0)
-    root = wp.bvh_get_group_root(surface, body)
+    root = wp.bvh_get_group_root(mesh.bvh, body)
     first = int(0)
     for fill in range(2):
         n = int(0)
         t = int(0)
-        query = wp.bvh_query_aabb(surface, of.lower[m], of.upper[m], root)
+        query = wp.bvh_query_aabb(mesh.bvh, of.lower[m], of.upper[m], root)
         while wp.bvh_query_next(query, t):
-            c = x[tris[t][2]]
-            p = part(x[tris[t][0]], x[tris[t][1]], c, c, own)
+            c = x[mesh.tris[t][2]]
+            p = part(x[mesh.tris[t][0]], x[mesh.tris[t][1]], c, c, own)
             if reaches(p, back):
                 if fill == 1:
                     near_tri[first + n] = t
@@ -207,12 +209,14 @@ def near_parts(
                 hi = wp.max(hi, p.hi)
                 n += 1
         if fill == 0:
-            tri_lower[m, k] = lo
-            tri_upper[m, k] = hi
+            out.tri_lower = lo
+            out.tri_upper = hi
             first = wp.atomic_add(count, 0, n)
             if first + n > near_tri.shape[0]:
+                part_of[m, k] = out
                 return
-            range_of[m, k] = wp.vec2i(first, first + n)
+            out.tris = wp.vec2i(first, first + n)
+            part_of[m, k] = out
 
 
 @wp.kernel

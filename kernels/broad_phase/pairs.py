@@ -12,6 +12,17 @@ from warp_contact.kernels.sorting import sort
 wp.set_module_options(OPTIONS)
 
 
+@wp.struct
+class PairList:
+    """Vertices (or edges), the bodies that they may touch, and with which tets (or triangles)."""
+
+    n: wp.array[int]  # (1,) number of pairs
+    pair: wp.array[wp.vec2i]  # (capacity,) owner and body, in this order
+    start: wp.array[int]  # (n_owner + 1,) first pair of each owner
+    items: wp.array[wp.vec2i]  # (capacity,) first and end of each pair in ``item``
+    item: wp.array[int]  # (capacity of items,) tets or triangles, ascending for each owner
+
+
 @wp.func
 def append(owner: int, item: int, found: wp.array[wp.vec2i], n_found: wp.array[int]):
     """Add to a list; what does not fit is counted all the same."""

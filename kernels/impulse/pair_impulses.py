@@ -6,6 +6,8 @@ has no order, so the result repeats bit for bit.
 
 import warp as wp
 
+from warp_contact.kernels.impulse.constraint import Impulse
+from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -50,10 +52,8 @@ def add_pair_impulses(
     threads: int,
     unit: float,  # momentum of one count [N s]
     n_contact: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    lam: wp.array[float],  # (capacity,) [N s]
-    slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    contact: wp.array[Contact],  # (capacity,)
+    impulse: wp.array[Impulse],  # (capacity,)
     # in, out
     key: wp.array[wp.int64],  # (n_pair,) lower body * 2^32 + upper body, -1 where free
     total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
@@ -61,6 +61,7 @@ def add_pair_impulses(
 ):
     """For each contact: add its impulse to its pair, as integers."""
     for c in range(wp.tid(), n_contact[0], threads):
-        p = lam[c] * normal[c] + slip[c]
-        if lam[c] > 0.0 and not add(pair[c], p, unit, key, total):
+        given = impulse[c]
+        p = given.normal * contact[c].normal + given.friction
+        if given.normal > 0.0 and not add(contact[c].pair, p, unit, key, total):
             wp.atomic_max(needed, 0, key.shape[0] + 1)

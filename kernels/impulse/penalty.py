@@ -7,7 +7,10 @@ Heidelberger et al. 2004, with Coulomb friction as in Keiser et al. 2004 (one_pa
 
 import warp as wp
 
-from warp_contact.kernels.impulse.one_pass import give, relative_velocity
+from warp_contact.kernels.impulse.constraint import Constraint, Impulse
+from warp_contact.kernels.impulse.impulse import part_of
+from warp_contact.kernels.impulse.one_pass import with_friction
+from warp_contact.kernels.narrow_phase.contact import Contact, relative_velocity
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -22,23 +25,22 @@ def penalty_impulses(
     mu: float,
     dt: wp.array[float],  # (1,) [s]
     n_contact: wp.array[int],  # (1,)
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    depth: wp.array[float],  # (capacity,) [m]
-    coupled: wp.array[float],  # (capacity,) [1/kg]
-    open: wp.array[float],  # (capacity,) [m]
-    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
+    contact: wp.array[Contact],  # (capacity,)
+    constraint: wp.array[Constraint],  # (capacity,)
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
-    lam: wp.array[float],  # (capacity,) [N s]
-    slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    impulse: wp.array[Impulse],  # (capacity,)
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] its part at each vertex
 ):
     """For each contact: the impulse of the penalty force over one step."""
     for c in range(wp.tid(), n_contact[0], threads):
-        u = relative_velocity(c, vert, coef, v)
+        at = contact[c]
+        to = constraint[c]
+        u = relative_velocity(at, v)
         p = float(0.0)
-        if coupled[c] > 0.0 and depth[c] > 0.0:
-            p = dt[0] * wp.max(stiffness * depth[c] - damping * wp.dot(u, normal[c]), 0.0)
-        give(c, p, u, mu, coef, normal, coupled, open, turn, lam, slip, part)
+        if to.inv_mass_turning > 0.0 and at.depth > 0.0:
+            p = dt[0] * wp.max(stiffness * at.depth - damping * wp.dot(u, at.normal), 0.0)
+        given = with_friction(p, at.normal, u, mu, to)
+        for k in range(5):
+            part[5 * c + k] = part_of(k, at, to, given.normal * at.normal + given.friction)
+        impulse[c] = given

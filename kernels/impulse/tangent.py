@@ -28,12 +28,17 @@ pushes along n_f. There is no ramp across a gap that is too wide for friction, n
 
 import warp as wp
 
+from warp_contact.kernels.mobility import Mobility, mobility_of
+from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, contacts_of
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
 UPRIGHT = wp.constant(0.85)  # n . n_f below which a facet is another side of a rim, not a ramp
 LEVEL = wp.constant(1.0e-3)  # slope below which it is none, but rounding
+
+mat53 = wp.types.matrix(shape=(5, 3), dtype=wp.float32)
 
 
 @wp.func
@@ -46,57 +51,43 @@ def clamped(p: wp.vec3, bound: float) -> wp.vec3:
 
 
 @wp.func
-def allowed(p: wp.vec3, lam: float, mu: float, ramp: wp.vec3) -> wp.vec3:
-    """Of the tangential impulses that a normal one of lam allows, the nearest to p."""
+def allowed(p: wp.vec3, normal: float, mu: float, ramp: wp.vec3) -> wp.vec3:
+    """Of the tangential impulses that a normal one allows, the nearest to p."""
     steep = wp.length_sq(ramp)
     if steep == 0.0:
-        return clamped(p, mu * lam)
-    up = wp.clamp(wp.dot(p, ramp) / steep, 0.0, lam) * ramp
-    return up + clamped(p - up, mu * lam)
+        return clamped(p, mu * normal)
+    up = wp.clamp(wp.dot(p, ramp) / steep, 0.0, normal) * ramp
+    return up + clamped(p - up, mu * normal)
 
 
 @wp.func
-def turned(p: wp.vec4, n: wp.vec3, mu: float, ramp: wp.vec3) -> wp.vec4:
-    """Tangential and normal impulse of the last step where the normal is n now."""
-    along = wp.vec3(p[0], p[1], p[2])
-    along = allowed(along - wp.dot(along, n) * n, p[3], mu, ramp)
-    return wp.vec4(along[0], along[1], along[2], p[3])
-
-
-@wp.func
-def slope(c: int, vert: wp.array2d[int], n: wp.vec3, x: wp.array[wp.vec3]) -> wp.vec3:
-    """The ramp t of contact c of a vertex with a triangle; 0 for others."""
+def slope(c: Contact, x: wp.array[wp.vec3]) -> wp.vec3:
+    """The ramp t of a contact of a vertex with a triangle; 0 for others."""
     none = wp.vec3(0.0, 0.0, 0.0)
-    if vert[c, 1] != vert[c, 0]:  # an edge
+    if c.vert[1] != c.vert[0]:  # an edge
         return none
-    a = x[vert[c, 2]]
-    face = wp.normalize(wp.cross(x[vert[c, 3]] - a, x[vert[c, 4]] - a))
-    upright = wp.dot(face, n)
+    a = x[c.vert[2]]
+    face = wp.normalize(wp.cross(x[c.vert[3]] - a, x[c.vert[4]] - a))
+    upright = wp.dot(face, c.normal)
     if upright < UPRIGHT:
         return none
-    ramp = face / upright - n
+    ramp = face / upright - c.normal
     if wp.length_sq(ramp) < LEVEL * LEVEL:
         return none
     return ramp
 
 
 @wp.func
-def couple_weight(
-    c: int,
-    vert: wp.array2d[int],
-    coef: wp.array2d[float],
-    start: wp.array[int],
-    inv_mass: wp.array[float],
-    open: wp.array[float],
-    turn: wp.array2d[wp.vec3],
+def torque_weight(
+    c: Contact, graph: ContactGraph, bodies: Mobility, gap: float, turn: mat53
 ) -> float:
-    """What the couple of contact c adds to the largest eigenvalue of its matrix, a bound."""
+    """What the torque of a contact adds to the largest eigenvalue of its matrix, a bound."""
     q = wp.vec3(0.0, 0.0, 0.0)
     b = float(0.0)
     for k in range(5):
-        i = vert[c, k]
-        m = inv_mass[i] * float(start[i + 1] - start[i])
-        g = open[c] * turn[c, k]
-        q += m * coef[c, k] * g
+        i = c.vert[k]
+        m = mobility_of(i, bodies) * float(contacts_of(i, graph))
+        g = gap * turn[k]
+        q += m * c.coef[k] * g
         b += m * wp.dot(g, g)
     return 0.5 * (b + wp.sqrt(b * b + 4.0 * wp.dot(q, q)))

@@ -1,78 +1,139 @@
 """Impulses of the last step, as a start for those of the next.
 
 What rests on something needs almost the same impulses in every step. A vertex keeps those of its
-first contact for one step, and its next contact with the same body starts from them; for contacts
-of edges see persistent.py.
+first contact, by the body that it touches; an edge keeps those of all its contacts, with the
+contacts themselves (persistent.py). Where the normal has turned, the tangential impulse turns too.
 """
 
 import warp as wp
 
-from warp_contact.kernels.impulse.tangent import turned
+from warp_contact.kernels.impulse.constraint import Constraint, Impulse
+from warp_contact.kernels.impulse.impulse import part_of
+from warp_contact.kernels.impulse.tangent import allowed
+from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
 
 @wp.func
-def is_first(c: int, n_hit: int, vert: wp.array2d[int]) -> bool:
-    """Whether contact c is the first of a vertex; hits are sorted by vertex."""
-    return c < n_hit and (c == 0 or vert[c - 1, 0] != vert[c, 0])
+def turned(p: wp.vec4, n: wp.vec3, mu: float, ramp: wp.vec3) -> wp.vec4:
+    """Tangential and normal impulse of the last step where the normal is n now."""
+    along = wp.vec3(p[0], p[1], p[2])
+    along = allowed(along - wp.dot(along, n) * n, p[3], mu, ramp)
+    return wp.vec4(along[0], along[1], along[2], p[3])
+
+
+@wp.func
+def started(p: wp.vec4) -> Impulse:
+    """The impulse with which the sweeps begin."""
+    out = Impulse()
+    out.normal = p[3]
+    out.friction = wp.vec3(p[0], p[1], p[2])
+    out.ahead = p
+    return out
+
+
+@wp.func
+def kept_of(p: Impulse) -> wp.vec4:
+    """Tangential and normal impulse, as they are kept."""
+    return wp.vec4(p.friction[0], p.friction[1], p.friction[2], p.normal)
+
+
+@wp.func
+def is_first(c: int, n_vertex: int, contact: wp.array[Contact]) -> bool:
+    """Whether contact c is the first of a vertex; they are sorted by vertex."""
+    return c < n_vertex and (c == 0 or contact[c - 1].vert[0] != contact[c].vert[0])
 
 
 @wp.kernel
-def recall(
+def recall_vertices(
     # in
     threads: int,
-    n_hit: wp.array[int],  # (1,)
+    n_vertex: wp.array[int],  # (1,) contacts of vertices
     n_contact: wp.array[int],  # (1,)
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    pair: wp.array[wp.vec2i],  # (capacity,)
-    weight: wp.array[float],  # (capacity,) [1/kg]
-    open: wp.array[float],  # (capacity,) [m]
-    turn: wp.array2d[wp.vec3],  # (capacity, 5) [1/m]
-    mu: wp.array[float],  # (capacity,)
-    ramp: wp.array[wp.vec3],  # (capacity,)
+    contact: wp.array[Contact],  # (capacity,)
+    constraint: wp.array[Constraint],  # (capacity,)
     partner: wp.array[int],  # (n_vert,) body of the first contact in the last step, or -1
     kept: wp.array[wp.vec4],  # (n_vert,) [N s] its tangential and normal impulse
     # in, out
-    lam: wp.array[float],  # (capacity,) [N s]
-    slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    impulse: wp.array[Impulse],  # (capacity,)
     # out
-    ahead: wp.array[wp.vec4],  # (capacity,) [N s]
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] what they are at each vertex
 ):
     """For each contact; those of edges have their impulses already."""
     for c in range(wp.tid(), n_contact[0], threads):
-        n = normal[c]
-        i = vert[c, 0]
-        if weight[c] > 0.0 and is_first(c, n_hit[0], vert) and partner[i] == pair[c][1]:
-            old = turned(kept[i], n, mu[c], ramp[c])
-            lam[c] = old[3]
-            slip[c] = wp.vec3(old[0], old[1], old[2])
-            ahead[c] = old
-        p = lam[c] * n + slip[c]
+        at = contact[c]
+        to = constraint[c]
+        i = at.vert[0]
+        if to.inv_mass > 0.0 and is_first(c, n_vertex[0], contact) and partner[i] == at.pair[1]:
+            impulse[c] = started(turned(kept[i], at.normal, to.friction, to.ramp))
+        p = impulse[c].normal * at.normal + impulse[c].friction
         for k in range(5):
-            part[5 * c + k] = coef[c, k] * p + open[c] * wp.dot(turn[c, k], p) * n
+            part[5 * c + k] = part_of(k, at, to, p)
 
 
 @wp.kernel
-def keep(
+def recall_edges(
     # in
     threads: int,
-    n_hit: wp.array[int],  # (1,)
-    vert: wp.array2d[int],  # (capacity, 5)
-    pair: wp.array[wp.vec2i],  # (capacity,)
-    lam: wp.array[float],  # (capacity,) [N s]
-    slip: wp.array[wp.vec3],  # (capacity,) [N s]
+    n_vertex: wp.array[int],  # (1,) contacts of vertices
+    n_contact: wp.array[int],  # (1,)
+    contact: wp.array[Contact],  # (capacity,)
+    constraint: wp.array[Constraint],  # (capacity,)
+    source: wp.array[int],  # (capacity,) place of each contact of an edge
+    found: wp.array[EdgeContact],  # (capacity,) by place
+    # out
+    impulse: wp.array[Impulse],  # (capacity,)
+):
+    """For each contact of an edge: go on from its impulses; it has no ramp."""
+    for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
+        if constraint[c].inv_mass > 0.0:
+            level = wp.vec3(0.0, 0.0, 0.0)
+            kept = found[source[c]].kept
+            impulse[c] = started(turned(kept, contact[c].normal, constraint[c].friction, level))
+
+
+@wp.kernel
+def keep_vertices(
+    # in
+    threads: int,
+    n_vertex: wp.array[int],  # (1,) contacts of vertices
+    contact: wp.array[Contact],  # (capacity,)
+    impulse: wp.array[Impulse],  # (capacity,)
     # out
     partner: wp.array[int],  # (n_vert,)
     kept: wp.array[wp.vec4],  # (n_vert,) [N s]
 ):
     """For each contact of a vertex."""
-    n = wp.min(n_hit[0], lam.shape[0])
+    n = wp.min(n_vertex[0], contact.shape[0])
     for c in range(wp.tid(), n, threads):
-        if is_first(c, n, vert):
-            partner[vert[c, 0]] = pair[c][1]
-            kept[vert[c, 0]] = wp.vec4(slip[c][0], slip[c][1], slip[c][2], lam[c])
+        if is_first(c, n, contact):
+            i = contact[c].vert[0]
+            partner[i] = contact[c].pair[1]
+            kept[i] = kept_of(impulse[c])
+
+
+@wp.kernel
+def keep_edges(
+    # in
+    threads: int,
+    n_vertex: wp.array[int],  # (1,) contacts of vertices
+    n_contact: wp.array[int],  # (1,)
+    source: wp.array[int],  # (capacity,) place of each contact of an edge
+    impulse: wp.array[Impulse],  # (capacity,)
+    # in, out
+    found: wp.array[EdgeContact],  # (capacity,) by place
+    # out
+    edges: wp.array[EdgeContact],  # (capacity,) for the next step, sorted by edge and body
+    n_edge: wp.array[int],  # (1,)
+):
+    """For each contact of an edge: keep its impulses, and itself for the next step."""
+    if wp.tid() == 0:
+        n_edge[0] = wp.max(n_contact[0] - n_vertex[0], 0)
+    for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
+        now = found[source[c]]
+        now.kept = kept_of(impulse[c])
+        found[source[c]] = now
+        edges[c - n_vertex[0]] = now

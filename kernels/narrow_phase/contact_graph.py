@@ -1,43 +1,55 @@
 """The contacts at each vertex, as a list sorted by contact: sums over it repeat bit for bit.
 
 An entry is 5 c + k for vertex k of contact c. A vertex of weight zero has one too: it may receive a
-part of a couple.
+part of a torque.
 """
 
 import warp as wp
 
+from warp_contact.kernels.mobility import Mobility, mobility_of
+from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.sorting import sort
 
 wp.set_module_options(OPTIONS)
 
 
+@wp.struct
+class ContactGraph:
+    """Which contacts each vertex has."""
+
+    start: wp.array[int]  # (n_vert + 1,) first entry of each vertex
+    entry: wp.array[int]  # (5 capacity,)
+    n_touched: wp.array[int]  # (1,) vertices with entries
+    touched: wp.array[int]  # (n_vert,) which ones, in any order
+
+
 @wp.func
-def takes_part(c: int, k: int, vert: wp.array2d[int], coef: wp.array2d[float]) -> bool:
-    """Whether vertex k of contact c can receive an impulse; unused places repeat a vertex."""
-    if coef[c, k] != 0.0:
+def takes_part(c: Contact, k: int) -> bool:
+    """Whether vertex k of a contact can receive an impulse; unused places repeat a vertex."""
+    if c.coef[k] != 0.0:
         return True
-    if vert[c, 2] == vert[c, 0]:
+    if c.vert[2] == c.vert[0]:
         return False
     if k == 1 or k == 4:
-        return vert[c, k] != vert[c, k - 1]
+        return c.vert[k] != c.vert[k - 1]
     return True
 
 
 @wp.kernel
 def total_contacts(
     # in
-    hits: wp.array[int],  # (1,) vertices' contacts
-    crossings: wp.array[int],  # (1,) edges' contacts, behind them
+    of_verts: wp.array[int],  # (1,) contacts
+    of_edges: wp.array[int],  # (1,) contacts, behind them
     places: wp.array[int],  # (1,) taken by edges' contacts, with gaps between them
     capacity: int,
     # out
     n_contact: wp.array[int],  # (1,)
     # out, added to
-    needed: wp.array[int],  # largest number that did not fit
+    needed: wp.array[int],  # (1,) largest number that did not fit
 ):
     """One thread: the number of contacts."""
-    n = hits[0] + crossings[0]
+    n = of_verts[0] + of_edges[0]
     n_contact[0] = wp.min(n, capacity)
     if wp.max(n, places[0]) > capacity:
         wp.atomic_max(needed, 0, wp.max(n, places[0]))
@@ -48,8 +60,7 @@ def count_entries(
     # in
     threads: int,
     n_contact: wp.array[int],  # (1,)
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5)
+    contact: wp.array[Contact],  # (capacity,)
     # out
     n_touched: wp.array[int],  # (1,) 0: ``sort_entries`` counts them
     # out, added to
@@ -59,9 +70,10 @@ def count_entries(
     if wp.tid() == 0:
         n_touched[0] = 0
     for c in range(wp.tid(), n_contact[0], threads):
+        at = contact[c]
         for k in range(5):
-            if takes_part(c, k, vert, coef):
-                wp.atomic_add(count, vert[c, k], 1)
+            if takes_part(at, k):
+                wp.atomic_add(count, at.vert[k], 1)
 
 
 @wp.kernel
@@ -69,8 +81,7 @@ def fill_entries(
     # in
     threads: int,
     n_contact: wp.array[int],  # (1,)
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5)
+    contact: wp.array[Contact],  # (capacity,)
     # in, out
     start: wp.array[int],  # (n_vert + 1,) ends of the lists in, their starts out
     # out
@@ -78,9 +89,10 @@ def fill_entries(
 ):
     """For each contact: write its entries, from the end of each list downwards."""
     for c in range(wp.tid(), n_contact[0], threads):
+        at = contact[c]
         for k in range(5):
-            if takes_part(c, k, vert, coef):
-                entry[wp.atomic_sub(start, vert[c, k], 1) - 1] = 5 * c + k
+            if takes_part(at, k):
+                entry[wp.atomic_sub(start, at.vert[k], 1) - 1] = 5 * c + k
 
 
 @wp.kernel
@@ -103,11 +115,17 @@ def sort_entries(
 
 
 @wp.func
-def total(i: int, start: wp.array[int], entry: wp.array[int], part: wp.array[wp.vec3]) -> wp.vec3:
+def contacts_of(i: int, graph: ContactGraph) -> int:
+    """Number of contacts of vertex i."""
+    return graph.start[i + 1] - graph.start[i]
+
+
+@wp.func
+def total(i: int, graph: ContactGraph, part: wp.array[wp.vec3]) -> wp.vec3:
     """Sum of the parts of the contacts of vertex i, in their order."""
     p = wp.vec3(0.0, 0.0, 0.0)
-    for e in range(start[i], start[i + 1]):
-        p += part[entry[e]]
+    for e in range(graph.start[i], graph.start[i + 1]):
+        p += part[graph.entry[e]]
     return p
 
 
@@ -115,17 +133,14 @@ def total(i: int, start: wp.array[int], entry: wp.array[int], part: wp.array[wp.
 def add_parts(
     # in
     threads: int,
-    n_touched: wp.array[int],  # (1,)
-    touched: wp.array[int],  # (n_vert,)
-    start: wp.array[int],  # (n_vert + 1,)
-    entry: wp.array[int],  # (5 capacity,)
+    graph: ContactGraph,
     part: wp.array[wp.vec3],  # (5 capacity,) [kg y]
-    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    bodies: Mobility,
     # in, out
     y: wp.array[wp.vec3],  # (n_vert,) positions or velocities
 ):
     """For each vertex with contacts: add their parts."""
-    for k in range(wp.tid(), n_touched[0], threads):
-        i = touched[k]
-        if inv_mass[i] > 0.0:
-            y[i] = y[i] + inv_mass[i] * total(i, start, entry, part)
+    for k in range(wp.tid(), graph.n_touched[0], threads):
+        i = graph.touched[k]
+        if mobility_of(i, bodies) > 0.0:
+            y[i] = y[i] + mobility_of(i, bodies) * total(i, graph, part)

@@ -1,4 +1,4 @@
-"""Stage 2, edges: the contact of a surface edge with a body that it crosses.
+"""The contact of a surface edge with a body that it crosses.
 
 The paper leaves edge against edge out, but its own scenes need it. An edge pq enters N through the
 triangle t1 and leaves by t2.
@@ -219,7 +219,7 @@ def crossing_contact(
     surface: wp.uint64,
     body: int,
     edge: float,  # mean edge of the body [m]
-    fresh: bool,  # there are no overlaps from before the step
+    apart: bool,  # bodies did not overlap when the step began
     reach: float,  # of the candidates: both skins [m]
     among: wp.vec2i,  # first and end of its triangles that the edge may cross
     tri: wp.array[int],
@@ -245,7 +245,7 @@ def crossing_contact(
             return out  # the line only brushes a rim
         contact = on_ridge(p, q, tris[enter.tri], tris[leave.tri], x)
         if contact.found and wp.min(SHARP * contact.half, 1.0) * contact.d <= 2.0 * hit.t:
-            if not fresh or start_gap(contact, i, j, x0) > -STALE * edge:
+            if not apart or start_gap(contact, i, j, x0) > -STALE * edge:
                 return contact
             face = on_face(p, q, enter.t, leave.t, hit, tris, x)
             if start_gap(face, i, j, x0) > start_gap(contact, i, j, x0):
@@ -261,7 +261,7 @@ def crossing_contact(
         hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, p)
         if hit.tri >= 0:
             out = on_ridge(p, q, tris[hit.tri], tris[leave.tri], x)
-    if fresh and out.found and start_gap(out, i, j, x0) < -STALE * edge:
+    if apart and out.found and start_gap(out, i, j, x0) < -STALE * edge:
         out.found = False
     return out
 
@@ -271,7 +271,7 @@ def edge_contact(
     surface: wp.uint64,
     body: int,
     edge: float,  # mean edge of the body [m]
-    fresh: bool,  # there are no overlaps from before the step
+    apart: bool,  # bodies did not overlap when the step began
     reach: float,  # of the candidates: both skins [m]
     among: wp.vec2i,  # first and end of its triangles that the edge may cross
     tri: wp.array[int],
@@ -281,7 +281,7 @@ def edge_contact(
     e: wp.vec4i,
 ) -> EdgeContact:
     """The contact of an edge with a body, if it has one."""
-    out = crossing_contact(surface, body, edge, fresh, reach, among, tri, tris, x0, x, e[0], e[1])
+    out = crossing_contact(surface, body, edge, apart, reach, among, tri, tris, x0, x, e[0], e[1])
     if out.found and not opposes(edge_looks(tris[e[2]], tris[e[3]], out.n, x)):
         out.found = False
     return out

@@ -1,13 +1,16 @@
-"""Stage 2, edges: which surface edges cross another body, and the contact records of those.
+"""Which surface edges cross another body, and their contacts.
 
-Crossings are looked for where the impulses on the vertices lead.
+They are looked for where the impulses on the vertices lead.
 """
 
 import warp as wp
 
 from warp_contact.kernels.broad_phase.edges import gap_to
-from warp_contact.kernels.broad_phase.margins import CAREFUL
+from warp_contact.kernels.broad_phase.pairs import PairList
+from warp_contact.kernels.broad_phase.skins import CAREFUL
 from warp_contact.kernels.geometry import NONE, projected_crossing, projected_weights
+from warp_contact.kernels.mesh import Mesh
+from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact, edge_contact, is_same
 from warp_contact.kernels.narrow_phase.vertex_contact import SLIP
 from warp_contact.kernels.options import OPTIONS
@@ -52,24 +55,16 @@ def is_among(found: EdgeContact, first: int, contact: wp.array[EdgeContact]) -> 
 def find_crossings(
     # in
     threads: int,
-    hold: bool,  # contacts that have a place stay
-    fresh: bool,  # there are no overlaps from before the step
+    apart: bool,  # bodies did not overlap when the step began
+    mesh: Mesh,
+    pairs: PairList,  # edges and bodies
     skin: wp.array[float],  # (n_body,) [m]
-    n_pair: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,) edge and body
-    pair_tris: wp.array[wp.vec2i],  # (capacity,) first and end in ``tri``
-    tri: wp.array[int],  # (capacity,)
-    surface: wp.uint64,  # Bvh over the triangles, grouped by body
-    tris: wp.array[wp.vec3i],  # (n_tri,)
-    edges: wp.array[wp.vec4i],  # (n_edge,)
-    vert_body: wp.array[int],  # (n_vert,)
-    body_edge: wp.array[float],  # (n_body,) [m]
-    pace: wp.array[float],  # (n_body,) [m]
-    way: wp.array[float],  # (n_body + n_plane,) [m]
+    pace: wp.array[float],  # (n_body,) [m] largest of the last motions
+    travelled: wp.array[float],  # (n_body + n_plane,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
-    wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no crossing
+    clear_until: wp.array[float],  # (capacity,) [m] travelled by both bodies: no crossing before
     place: wp.array[int],  # (capacity,) that of the first in ``contact``, where there are any
     contact: wp.array[EdgeContact],  # (contacts,) in any order
     # out
@@ -78,38 +73,36 @@ def find_crossings(
     n_place: wp.array[int],  # (1,)
     n_new: wp.array[int],  # (1,) contacts found
 ):
-    """For each candidate, and for the room behind them.
+    """For each pair, and for the capacity behind them: a contact beside those it has.
 
-    Contacts that do not fit are left out; ``total_contacts`` counts crossings and asks for room.
+    Contacts that do not fit are left out; ``total_contacts`` counts them and asks for room.
     """
     for c in range(wp.tid(), crossing.shape[0], threads):
         crossing[c] = 0
-        if c >= n_pair[0]:
+        if c >= pairs.n[0]:
             continue
-        if not hold:
-            place[c] = -1
         last = place[c]
         if last >= 0:
             crossing[c] = 1
             while contact[last].next >= 0:
                 last = contact[last].next
                 crossing[c] = crossing[c] + 1
-        e = edges[pair[c][0]]
-        i = e[0]
-        j = e[1]
-        body = pair[c][1]
-        spent = way[vert_body[i]] + way[body]
-        reach = skin[vert_body[i]] + skin[body]
-        if spent < wake[c]:
+        e = mesh.edges[pairs.pair[c][0]]
+        own = mesh.vert_body[e[0]]
+        body = pairs.pair[c][1]
+        spent = travelled[own] + travelled[body]
+        reach = skin[own] + skin[body]
+        if spent < clear_until[c]:
             continue
-        enough = wp.min(AHEAD * (pace[vert_body[i]] + pace[body]), reach)
-        clear = clearance(pair_tris[c], enough, tri, tris, x, x[i], x[j])
-        wake[c] = spent + CAREFUL * clear
+        among = pairs.items[c]
+        enough = wp.min(AHEAD * (pace[own] + pace[body]), reach)
+        clear = clearance(among, enough, pairs.item, mesh.tris, x, x[e[0]], x[e[1]])
+        clear_until[c] = spent + CAREFUL * clear
         if clear > 0.0:
             continue
-        edge = body_edge[body]
+        edge = mesh.body_edge[body]
         found = edge_contact(
-            surface, body, edge, fresh, reach, pair_tris[c], tri, tris, x0, x, edges[pair[c][0]]
+            mesh.bvh, body, edge, apart, reach, among, pairs.item, mesh.tris, x0, x, e
         )
         if not found.found or (last >= 0 and is_among(found, place[c], contact)):
             continue
@@ -118,7 +111,7 @@ def find_crossings(
         k = wp.atomic_add(n_place, 0, 1)
         if k >= contact.shape[0]:
             continue
-        found.edge = pair[c][0]
+        found.edge = pairs.pair[c][0]
         found.body = body
         found.next = -1
         contact[k] = found
@@ -149,44 +142,38 @@ def at_start(c: EdgeContact, i: int, j: int, x: wp.array[wp.vec3]) -> EdgeContac
 def edge_contacts(
     # in
     threads: int,
-    n_pair: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,) edge and body
-    edges: wp.array[wp.vec4i],  # (n_edge,)
-    vert_body: wp.array[int],  # (n_vert,)
-    n_hit: wp.array[int],  # (1,)
-    crossing_at: wp.array[int],  # (capacity + 1,) contacts before each candidate
+    mesh: Mesh,
+    pairs: PairList,  # edges and bodies
+    n_vertex: wp.array[int],  # (1,) contacts of vertices
+    crossing_at: wp.array[int],  # (capacity + 1,) contacts before each pair
     place: wp.array[int],  # (capacity,)
-    contact: wp.array[EdgeContact],  # (contacts,)
+    found: wp.array[EdgeContact],  # (contacts,) by place
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step, for the weights
     # out
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    depth: wp.array[float],  # (capacity,) [m]
-    offset: wp.array[float],  # (capacity,) [m] gap = (sum coef x) . normal - offset
-    pair_of: wp.array[wp.vec2i],  # (capacity,)
-    source: wp.array[int],  # (capacity,) place of the contact in ``contact``
+    contact: wp.array[Contact],  # (contacts,)
+    source: wp.array[int],  # (contacts,) place of each contact of an edge
 ):
-    """For each candidate: its contacts, behind those of the vertices."""
-    for k in range(wp.tid(), n_pair[0], threads):
-        c = n_hit[0] + crossing_at[k]
-        end = n_hit[0] + crossing_at[k + 1]
-        i = edges[pair[k][0]][0]
-        j = edges[pair[k][0]][1]
+    """For each pair: its contacts, behind those of the vertices."""
+    for k in range(wp.tid(), pairs.n[0], threads):
+        c = n_vertex[0] + crossing_at[k]
+        end = n_vertex[0] + crossing_at[k + 1]
+        e = mesh.edges[pairs.pair[k][0]]
         at = place[k]
-        while c < wp.min(end, normal.shape[0]) and at >= 0:
-            found = at_start(contact[at], i, j, x0)
-            vert[c, 0] = i
-            vert[c, 1] = j
-            coef[c, 0] = 1.0 - found.t
-            coef[c, 1] = found.t
+        while c < wp.min(end, contact.shape[0]) and at >= 0:
+            now = at_start(found[at], e[0], e[1], x0)
+            to = Contact()
+            to.vert[0] = e[0]
+            to.vert[1] = e[1]
+            to.coef[0] = 1.0 - now.t
+            to.coef[1] = now.t
             for m in range(3):
-                vert[c, 2 + m] = found.vert[m]
-                coef[c, 2 + m] = -found.w[m]
-            normal[c] = found.n
-            depth[c] = found.d
-            offset[c] = 0.0
-            pair_of[c] = wp.vec2i(vert_body[i], pair[k][1])
+                to.vert[2 + m] = now.vert[m]
+                to.coef[2 + m] = -now.w[m]
+            to.normal = now.n
+            to.depth = now.d
+            to.pair = wp.vec2i(mesh.vert_body[e[0]], pairs.pair[k][1])
+            to.edge = mesh.body_edge[mesh.vert_body[e[0]]]
+            contact[c] = to
             source[c] = at
-            at = found.next
+            at = now.next
             c += 1

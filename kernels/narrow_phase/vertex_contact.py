@@ -1,4 +1,4 @@
-"""Stage 2, vertices: the contact of each hit with a triangle or a plane.
+"""The contact of each vertex inside a body with a triangle, or with a plane.
 
 The contact point is where the ray from the vertex along its direction leaves the body (Spillmann &
 Teschner 2005, section 3.2), and the way to there replaces the depth. Where no direction is known,
@@ -7,8 +7,9 @@ instead. So it does where the contact would have overlapped at the start of the 
 the closest point's less: the vertex came in by another side. Where that would have overlapped too,
 close to a rim, it is led back through the triangle by which it came in.
 
-A vertex in the skin, outside, makes a contact with a gap. The impulses then know of it before it
-closes: what rests stays in contact in every step, and its force does not come in blows.
+A vertex in the speculative margin, outside, makes a contact with a gap. The impulses then know of
+it before it closes: what rests stays in contact in every step, and its force does not come in
+blows.
 
 Triangle and direction are those at the predicted positions, the weights those at the start of the
 step x0, seen along the direction: sum a_k x0_k is then parallel to the normal impulse and angular
@@ -18,6 +19,8 @@ momentum is kept, since L = sum m x0 x v for symplectic Euler.
 import warp as wp
 
 from warp_contact.kernels.geometry import projected_weights
+from warp_contact.kernels.mesh import Mesh
+from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.opposing import along, closest_opposing, looks
 from warp_contact.kernels.narrow_phase.surface_query import (
     Hit,
@@ -27,7 +30,7 @@ from warp_contact.kernels.narrow_phase.surface_query import (
     inner_side,
     leaving_hit,
 )
-from warp_contact.kernels.narrow_phase.vertices import SKIN
+from warp_contact.kernels.narrow_phase.vertices import MARGIN, Penetration
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -82,9 +85,9 @@ def inner_contact(
     if layer < 0 or depth <= 0.0:
         return out
     ray = leaving_hit(surface, root, tris, x, x[i], r)
-    if ray.tri < 0:  # in the skin, beside the body: from just inside it
+    if ray.tri < 0:  # in the margin, beside the body: from just inside it
         near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
-        inner = hit_point(near, tris, x) - 2.0 * SKIN * edge * face_normal(tris[near.tri], x)
+        inner = hit_point(near, tris, x) - 2.0 * MARGIN * edge * face_normal(tris[near.tri], x)
         ray = leaving_hit(surface, root, tris, x, inner, r)
         if ray.tri >= 0:
             ray.t = wp.dot(hit_point(ray, tris, x) - x[i], r)
@@ -114,7 +117,7 @@ def closest_contact(
     near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
     inside = inner_side(near, tris, x, x[i])
     if inside <= FLUSH * edge:
-        near = closest_opposing(surface, root, tris, vs_start, vs_tri, x, i, 2.0 * SKIN * edge)
+        near = closest_opposing(surface, root, tris, vs_start, vs_tri, x, i, 2.0 * MARGIN * edge)
     if near.tri < 0:
         return out
     n = face_normal(tris[near.tri], x)
@@ -153,82 +156,74 @@ def entry_contact(
     return out
 
 
+@wp.func
+def found_contact(
+    e: Penetration,
+    apart: bool,
+    mesh: Mesh,
+    x0: wp.array[wp.vec3],
+    x: wp.array[wp.vec3],
+) -> VertexContact:
+    """The contact of a penetration with a triangle, if there is any."""
+    i = e.vert
+    edge = mesh.body_edge[e.body]
+    stale = -STALE * edge
+    root = wp.bvh_get_group_root(mesh.bvh, e.body)
+    out = inner_contact(mesh.bvh, root, mesh.tris, x0, x, i, e.layer, e.depth, e.direction, edge)
+    if not out.found or (apart and out.start < stale):
+        near = closest_contact(
+            mesh.bvh, root, mesh.tris, mesh.vs_start, mesh.vs_tri, x0, x, i, edge
+        )
+        if near.found and not (out.found and out.start >= near.start):
+            out = near
+    if out.found and apart and out.start < stale:
+        entry = entry_contact(mesh.bvh, root, mesh.tris, x0, x, i, edge)
+        if entry.found and entry.start >= stale:
+            out = entry
+    return out
+
+
 @wp.kernel
 def vertex_contacts(
     # in
     threads: int,
-    n_body: int,
-    fresh: bool,  # there are no overlaps from before the step
-    surface: wp.uint64,  # Bvh over the triangles, grouped by body
-    tris: wp.array[wp.vec3i],  # (n_tri,)
-    body_edge: wp.array[float],  # (n_body,) [m]
-    vert_body: wp.array[int],  # (n_vert,)
-    on_surface: wp.array[int],  # (n_vert,)
-    vs_start: wp.array[int],  # (n_vert + 1,)
-    vs_tri: wp.array[int],  # (3 n_tri,)
-    plane_n: wp.array[wp.vec3],  # (n_plane,)
-    plane_h: wp.array[float],  # (n_plane,) [m]
+    apart: bool,  # bodies did not overlap when the step began
+    mesh: Mesh,
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    hit_at: wp.array[int],  # (n_pair + 1,)
-    hit_vert: wp.array[int],  # (capacity,)
-    hit_body: wp.array[int],  # (capacity,)
-    hit_layer: wp.array[int],  # (capacity,)
-    hit_depth: wp.array[float],  # (capacity,) [m]
-    hit_dir: wp.array[wp.vec3],  # (capacity,)
+    n_inside: wp.array[int],  # (1,) penetrations
+    penetration: wp.array[Penetration],  # (capacity,)
     # out
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5), all 0 for a hit that makes no contact
-    normal: wp.array[wp.vec3],  # (capacity,)
-    depth: wp.array[float],  # (capacity,) [m]
-    offset: wp.array[float],  # (capacity,) [m] gap = (sum coef x) . normal - offset
-    pair: wp.array[wp.vec2i],  # (capacity,)
+    contact: wp.array[Contact],  # (capacity,)
 ):
-    """For each hit: contact c = hit e of a surface vertex with a triangle or a plane."""
-    for e in range(wp.tid(), wp.min(hit_at[hit_at.shape[0] - 1], hit_vert.shape[0]), threads):
-        i = hit_vert[e]
-        body = hit_body[e]
+    """For each penetration of a surface vertex: its contact with a triangle or a plane."""
+    for e in range(wp.tid(), wp.min(n_inside[0], contact.shape[0]), threads):
+        i = penetration[e].vert
+        body = penetration[e].body
+        to = Contact()
         for k in range(5):
-            vert[e, k] = i
-            coef[e, k] = 0.0
-        depth[e] = 0.0
-        offset[e] = 0.0
-        normal[e] = wp.vec3(0.0, 0.0, 0.0)
-        pair[e] = wp.vec2i(vert_body[i], body)
-        if body >= n_body:
-            n = plane_n[body - n_body]
-            coef[e, 0] = 1.0
-            normal[e] = n
-            offset[e] = plane_h[body - n_body]
-            depth[e] = offset[e] - wp.dot(n, x[i])
-            continue
-        if on_surface[i] == 0:
-            continue
-        root = wp.bvh_get_group_root(surface, body)
-        out = inner_contact(
-            surface, root, tris, x0, x, i, hit_layer[e], hit_depth[e], hit_dir[e], body_edge[body]
-        )
-        if not out.found or (fresh and out.start < -STALE * body_edge[body]):
-            near = closest_contact(surface, root, tris, vs_start, vs_tri, x0, x, i, body_edge[body])
-            if near.found and not (out.found and out.start >= near.start):
-                out = near
-        if out.found and fresh and out.start < -STALE * body_edge[body]:
-            entry = entry_contact(surface, root, tris, x0, x, i, body_edge[body])
-            if entry.found and entry.start >= -STALE * body_edge[body]:
-                out = entry
-        if not out.found:
-            continue
-        t = tris[out.hit.tri]
-        r = out.n
-        w = projected_weights(x0[i], r, x0[t[0]], x0[t[1]], x0[t[2]])
-        if wp.length(w - out.hit.w) > SLIP:
-            w = out.hit.w
-        vert[e, 2] = t[0]
-        vert[e, 3] = t[1]
-        vert[e, 4] = t[2]
-        coef[e, 0] = 1.0
-        coef[e, 2] = -w[0]
-        coef[e, 3] = -w[1]
-        coef[e, 4] = -w[2]
-        normal[e] = r
-        depth[e] = wp.dot(hit_point(out.hit, tris, x) - x[i], r)
+            to.vert[k] = i
+        to.pair = wp.vec2i(mesh.vert_body[i], body)
+        to.edge = mesh.body_edge[mesh.vert_body[i]]
+        to.on_plane = body >= mesh.n_body
+        if to.on_plane:
+            n = mesh.plane_n[body - mesh.n_body]
+            to.coef[0] = 1.0
+            to.normal = n
+            to.offset = mesh.plane_h[body - mesh.n_body]
+            to.depth = to.offset - wp.dot(n, x[i])
+        elif mesh.on_surface[i] != 0:
+            out = found_contact(penetration[e], apart, mesh, x0, x)
+            if out.found:
+                t = mesh.tris[out.hit.tri]
+                r = out.n
+                w = projected_weights(x0[i], r, x0[t[0]], x0[t[1]], x0[t[2]])
+                if wp.length(w - out.hit.w) > SLIP:
+                    w = out.hit.w
+                to.coef[0] = 1.0
+                for k in range(3):
+                    to.vert[2 + k] = t[k]
+                    to.coef[2 + k] = -w[k]
+                to.normal = r
+                to.depth = wp.dot(hit_point(out.hit, mesh.tris, x) - x[i], r)
+        contact[e] = to

@@ -1,20 +1,23 @@
-"""Stage 1, in every step: which candidates are hits, a vertex inside a body or below a plane.
+"""Which vertices lie inside a body or below a plane: the penetrations of a step.
 
-A vertex in the skin of a body, SKIN of an edge, is a hit too. Rims that lie flush in a wall would
-else be inside or outside by rounding, and a contact at rest would be lost and found in turns.
+A vertex within the speculative margin of a body, MARGIN of an edge, counts as one, too. Rims that
+lie flush in a wall would else be inside or outside by rounding, and a contact at rest would be lost
+and found in turns.
 
-Hits keep the order of their candidates: by vertex, then by body, planes last.
+Penetrations keep the order of their pairs: by vertex, then by body, planes last.
 """
 
 import warp as wp
 
-from warp_contact.kernels.broad_phase.margins import CAREFUL
+from warp_contact.kernels.broad_phase.pairs import PairList
+from warp_contact.kernels.broad_phase.skins import CAREFUL
 from warp_contact.kernels.geometry import NONE, tet_weights, triangle_closest
+from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-SKIN = wp.constant(1.0e-3)  # of an edge: a vertex this close is looked at like one inside
+MARGIN = wp.constant(1.0e-3)  # of an edge: a vertex this close is looked at like one inside
 
 
 @wp.func
@@ -51,120 +54,128 @@ def distance_to_faces(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3
 @wp.func
 def clearance(
     x: wp.vec3,
-    skin: float,  # [m]
+    margin: float,  # [m]
     among: wp.vec2i,
     tet: wp.array[int],
     tets: wp.array[wp.vec4i],
     y: wp.array[wp.vec3],
 ) -> float:
-    """A distance [m] that x keeps from the skins of all tets, not above 0 where it is in one."""
+    """A distance [m] that x keeps from the margins of all tets, not above 0 where it is in one."""
     out = float(NONE)
     for k in range(among[0], among[1]):
         t = tets[tet[k]]
         if wp.min(tet_weights(x, y[t[0]], y[t[1]], y[t[2]], y[t[3]])) >= 0.0:
             return 0.0
-        apart = distance(x, y[t[0]], y[t[1]], y[t[2]], y[t[3]]) - skin
+        apart = distance(x, y[t[0]], y[t[1]], y[t[2]], y[t[3]]) - margin
         if apart < 0.0:
-            apart = distance_to_faces(x, y[t[0]], y[t[1]], y[t[2]], y[t[3]]) - skin
+            apart = distance_to_faces(x, y[t[0]], y[t[1]], y[t[2]], y[t[3]]) - margin
             if apart <= 0.0:
                 return 0.0
         out = wp.min(out, apart)
     return out
 
 
+@wp.struct
+class Penetration:
+    """A vertex inside a body; depth.py finds its depth."""
+
+    vert: int
+    body: int  # n_body + p for plane p
+    layer: int  # of the propagation, -1: no depth yet
+    depth: float  # [m]
+    direction: wp.vec3  # out of the body
+
+
 @wp.kernel
-def find_hits(
+def find_penetrations(
     # in
     threads: int,
-    n_pair: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,) vertex and body, n_body + p for plane p
-    pair_tets: wp.array[wp.vec2i],  # (capacity,) first and end in ``tet``
-    tet: wp.array[int],  # (capacity,)
-    n_body: int,
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    vert_body: wp.array[int],  # (n_vert,)
-    body_edge: wp.array[float],  # (n_body,) [m]
-    plane_n: wp.array[wp.vec3],  # (n_plane,)
-    plane_h: wp.array[float],  # (n_plane,) [m]
-    way: wp.array[float],  # (n_body + n_plane,) [m]
+    mesh: Mesh,
+    pairs: PairList,  # vertices and bodies
+    travelled: wp.array[float],  # (n_body + n_plane,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
-    wake: wp.array[float],  # (capacity,) [m] way of both bodies until which there is no hit
+    clear_until: wp.array[float],  # (capacity,) [m] travelled by both bodies: no penetration before
     # out
-    hit: wp.array[int],  # (capacity + 1,) 1 for a hit, 0 for all others
+    is_inside: wp.array[int],  # (capacity + 1,) 1 for a penetration, 0 for all others
 ):
-    """For each candidate, and for the room behind them."""
-    for c in range(wp.tid(), hit.shape[0], threads):
-        hit[c] = 0
-        if c >= n_pair[0]:
+    """For each pair, and for the capacity behind them."""
+    for c in range(wp.tid(), is_inside.shape[0], threads):
+        is_inside[c] = 0
+        if c >= pairs.n[0]:
             continue
-        i = pair[c][0]
-        body = pair[c][1]
-        spent = way[vert_body[i]] + way[body]
-        if spent < wake[c]:
+        i = pairs.pair[c][0]
+        body = pairs.pair[c][1]
+        spent = travelled[mesh.vert_body[i]] + travelled[body]
+        if spent < clear_until[c]:
             continue
-        wake[c] = -1.0
+        clear_until[c] = -1.0
         clear = float(0.0)
         inside = bool(False)
-        if body >= n_body:
-            clear = wp.dot(plane_n[body - n_body], x[i]) - plane_h[body - n_body]
+        if body >= mesh.n_body:
+            p = body - mesh.n_body
+            clear = wp.dot(mesh.plane_n[p], x[i]) - mesh.plane_h[p]
             inside = clear < 0.0
         else:
-            clear = clearance(x[i], SKIN * body_edge[body], pair_tets[c], tet, tets, x)
+            margin = MARGIN * mesh.body_edge[body]
+            clear = clearance(x[i], margin, pairs.items[c], pairs.item, mesh.tets, x)
             inside = clear <= 0.0
         if inside:
-            hit[c] = 1
+            is_inside[c] = 1
         else:
-            wake[c] = spent + CAREFUL * clear
+            clear_until[c] = spent + CAREFUL * clear
 
 
 @wp.kernel
-def list_hits(
+def list_penetrations(
     # in
     threads: int,
     n_body: int,
-    n_pair: wp.array[int],  # (1,)
-    pair: wp.array[wp.vec2i],  # (capacity,)
-    hit_at: wp.array[int],  # (capacity + 1,) hits before each candidate
+    pairs: PairList,  # vertices and bodies
+    inside_at: wp.array[int],  # (capacity + 1,) penetrations before each pair
     # out
-    hit_vert: wp.array[int],  # (contacts,)
-    hit_body: wp.array[int],  # (contacts,) n_body + p for plane p
-    hit_layer: wp.array[int],  # (contacts,) -1: no depth yet
+    penetration: wp.array[Penetration],  # (contacts,)
     layer: wp.array[int],  # (1,) 0
     pending: wp.array[int],  # (1,) 0
 ):
-    """For each candidate; the first thread sets what their depths begin with."""
+    """For each pair; the first thread sets what their depths begin with."""
     if wp.tid() == 0:
         layer[0] = 0
         pending[0] = 0
-    for c in range(wp.tid(), n_pair[0], threads):
-        e = hit_at[c]
-        if hit_at[c + 1] == e or e >= hit_vert.shape[0]:
+    for c in range(wp.tid(), pairs.n[0], threads):
+        e = inside_at[c]
+        if inside_at[c + 1] == e or e >= penetration.shape[0]:
             continue
-        hit_vert[e] = pair[c][0]
-        hit_body[e] = pair[c][1]
-        hit_layer[e] = -1
-        if pair[c][1] >= n_body:
-            hit_layer[e] = 0
+        found = Penetration()
+        found.vert = pairs.pair[c][0]
+        found.body = pairs.pair[c][1]
+        found.layer = wp.where(found.body >= n_body, 0, -1)
+        penetration[e] = found
 
 
 @wp.func
-def hit_range(i: int, pair_start: wp.array[int], hit_at: wp.array[int], room: int) -> wp.vec2i:
-    """First and end of the hits of vertex i; none where the candidates did not fit."""
-    last = hit_at.shape[0] - 1
+def penetrations_of(
+    i: int, start: wp.array[int], inside_at: wp.array[int], capacity: int
+) -> wp.vec2i:
+    """First and end of the penetrations of vertex i; none where the pairs did not fit."""
+    last = inside_at.shape[0] - 1
     return wp.vec2i(
-        wp.min(hit_at[wp.min(pair_start[i], last)], room),
-        wp.min(hit_at[wp.min(pair_start[i + 1], last)], room),
+        wp.min(inside_at[wp.min(start[i], last)], capacity),
+        wp.min(inside_at[wp.min(start[i + 1], last)], capacity),
     )
 
 
 @wp.func
-def is_hit(
-    i: int, body: int, pair_start: wp.array[int], hit_at: wp.array[int], hit_body: wp.array[int]
+def is_inside_of(
+    i: int,
+    body: int,
+    start: wp.array[int],
+    inside_at: wp.array[int],
+    penetration: wp.array[Penetration],
 ) -> bool:
     """Whether vertex i is inside the body."""
-    around = hit_range(i, pair_start, hit_at, hit_body.shape[0])
+    around = penetrations_of(i, start, inside_at, penetration.shape[0])
     for e in range(around[0], around[1]):
-        if hit_body[e] == body:
+        if penetration[e].body == body:
             return True
     return False

@@ -8,6 +8,7 @@ import warp as wp
 
 from warp_contact.kernels.broad_phase.bounds import next_in
 from warp_contact.kernels.geometry import tet_weights
+from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.surface_query import closest_hit, first_crossing, inner_side
 from warp_contact.kernels.options import OPTIONS
 
@@ -37,15 +38,9 @@ def tet_boxes(
 def vertex_overlaps(
     # in
     volumes: wp.uint64,  # Bvh over the tets, grouped by world
-    surface: wp.uint64,  # Bvh over the triangles, grouped by body
+    mesh: Mesh,
     surf: wp.array[int],  # (n_surf,)
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    tris: wp.array[wp.vec3i],  # (n_tri,)
-    vert_body: wp.array[int],  # (n_vert,)
     body_world: wp.array[int],  # (n_body,)
-    body_edge: wp.array[float],  # (n_body,) [m]
-    plane_n: wp.array[wp.vec3],  # (n_plane,)
-    plane_h: wp.array[float],  # (n_plane,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     overlap: wp.array[float],  # (n_surf,) [m]
@@ -54,25 +49,23 @@ def vertex_overlaps(
     """One thread per surface vertex: its deepest overlap."""
     k = wp.tid()
     i = surf[k]
+    own = mesh.vert_body[i]
     p = x[i]
     overlap[k] = 0.0
     partner[k] = -1
-    for m in range(plane_n.shape[0]):
-        d = plane_h[m] - wp.dot(plane_n[m], p)
+    for m in range(mesh.plane_n.shape[0]):
+        d = mesh.plane_h[m] - wp.dot(mesh.plane_n[m], p)
         if d > overlap[k]:
             overlap[k] = d
-            partner[k] = body_edge.shape[0] + m
-    world = body_world[vert_body[i]]
+            partner[k] = mesh.n_body + m
+    world = body_world[own]
     q = next_in(volumes, world, p, p, -1)
     while q >= 0:
-        t = tets[q]
-        body = vert_body[t[0]]
-        if (
-            body != vert_body[i]
-            and wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0
-        ):
-            root = wp.bvh_get_group_root(surface, body)
-            hit = closest_hit(surface, root, tris, x, p, 0.1 * body_edge[body])
+        t = mesh.tets[q]
+        body = mesh.vert_body[t[0]]
+        if body != own and wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0:
+            root = wp.bvh_get_group_root(mesh.bvh, body)
+            hit = closest_hit(mesh.bvh, root, mesh.tris, x, p, 0.1 * mesh.body_edge[body])
             if hit.t > overlap[k]:
                 overlap[k] = hit.t
                 partner[k] = body
@@ -83,12 +76,8 @@ def vertex_overlaps(
 def edge_overlaps(
     # in
     bodies: wp.uint64,  # Bvh over the bodies, grouped by world
-    surface: wp.uint64,  # Bvh over the triangles, grouped by body
-    tris: wp.array[wp.vec3i],  # (n_tri,)
-    edges: wp.array[wp.vec4i],  # (n_edge,)
-    vert_body: wp.array[int],  # (n_vert,)
+    mesh: Mesh,
     body_world: wp.array[int],  # (n_body,)
-    body_edge: wp.array[float],  # (n_body,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     overlap: wp.array[float],  # (n_edge,) [m]
@@ -96,21 +85,23 @@ def edge_overlaps(
 ):
     """One thread per surface edge: the deepest middle of an inner piece."""
     e = wp.tid()
-    p = x[edges[e][0]]
-    q = x[edges[e][1]]
-    own = vert_body[edges[e][0]]
+    i = mesh.edges[e][0]
+    p = x[i]
+    q = x[mesh.edges[e][1]]
+    own = mesh.vert_body[i]
     overlap[e] = 0.0
     partner[e] = -1
     world = body_world[own]
     body = next_in(bodies, world, wp.min(p, q), wp.max(p, q), -1)
     while body >= 0:
         if body != own:
-            root = wp.bvh_get_group_root(surface, body)
-            piece = first_crossing(surface, root, tris, x, p, q - p)
+            root = wp.bvh_get_group_root(mesh.bvh, body)
+            piece = first_crossing(mesh.bvh, root, mesh.tris, x, p, q - p)
             if piece.enter.tri >= 0 and piece.leave.tri >= 0:
                 middle = p + 0.5 * (piece.enter.t + piece.leave.t) * (q - p)
-                hit = closest_hit(surface, root, tris, x, middle, 0.1 * body_edge[body])
-                if hit.t > overlap[e] and inner_side(hit, tris, x, middle) > 0.0:
+                reach = 0.1 * mesh.body_edge[body]
+                hit = closest_hit(mesh.bvh, root, mesh.tris, x, middle, reach)
+                if hit.t > overlap[e] and inner_side(hit, mesh.tris, x, middle) > 0.0:
                     overlap[e] = hit.t
                     partner[e] = body
         body = next_in(bodies, world, wp.min(p, q), wp.max(p, q), body)

@@ -1,41 +1,30 @@
 """What went through a surface between two looks at the scene.
 
-A point goes from p0 to p1 while a triangle goes from (a0, b0, c0) to (a1, b1, c1), all of them
-straight and at constant speed. With u = p - a, v = b - a, w = c - a [m] the point is in the plane
-of the triangle where
-
-    f(s) = u(s) . (v(s) x w(s)) = 0,   0 <= s <= 1      [m^3], a cubic (Provot 1997)
-
-It goes in where f falls and out where f rises. What goes in by a face and out by one that looks the
-other way went through; out by the same face, or round a corner, it did not. It has to be deeper
-than ``SKIN`` of the body's thickness on its way: a vertex that grazes a base from rim to rim does
-not go through the body.
+A point and the triangles of a body move straight from one look to the next; crossing_time.py says
+when they meet. What goes in by a face and out by one that looks the other way went through; out by
+the same face, or round a corner, it did not. It has to be deeper than ``DEEP`` of the body's
+thickness on its way: a vertex that grazes a base from rim to rim does not go through the body.
 """
 
 import warp as wp
 
 from warp_contact.kernels.broad_phase.bounds import GROW, next_in
-from warp_contact.kernels.geometry import GROWN, NONE, triangle_closest
+from warp_contact.kernels.geometry import NONE, triangle_closest
+from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.surface_query import face_normal
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.output.crossing_time import (
+    Relative,
+    between,
+    crossing_time,
+    height,
+    turning,
+)
 
 wp.set_module_options(OPTIONS)
 
 OPPOSED = wp.constant(-0.5)  # cosine between two faces that look away from each other
-SKIN = wp.constant(0.1)  # of the thickness of a body
-HALVINGS = wp.constant(24)  # of an interval, down to the rounding of its end
-
-
-@wp.struct
-class Relative:
-    """Point, second and third corner against the first corner, at s = 0 and s = 1 [m]."""
-
-    u0: wp.vec3
-    u1: wp.vec3
-    v0: wp.vec3
-    v1: wp.vec3
-    w0: wp.vec3
-    w1: wp.vec3
+DEEP = wp.constant(0.1)  # of the thickness of a body
 
 
 @wp.struct
@@ -48,78 +37,6 @@ class Trip:
     back_tri: int
     left: float
     left_tri: int
-
-
-@wp.func
-def between(a: wp.vec3, b: wp.vec3, s: float) -> wp.vec3:
-    return (1.0 - s) * a + s * b  # exact at both ends: the next look starts where this one ended
-
-
-@wp.func
-def height(r: Relative, s: float) -> float:
-    """f(s): above zero outside [m^3]."""
-    n = wp.cross(between(r.v0, r.v1, s), between(r.w0, r.w1, s))
-    return wp.dot(between(r.u0, r.u1, s), n)
-
-
-@wp.func
-def turning(r: Relative) -> wp.vec2:
-    """Where f turns, in ascending order; 0 or 1 for what is not within (0, 1)."""
-    du = r.u1 - r.u0
-    dv = r.v1 - r.v0
-    dw = r.w1 - r.w0
-    n0 = wp.cross(r.v0, r.w0)
-    n1 = wp.cross(dv, r.w0) + wp.cross(r.v0, dw)
-    n2 = wp.cross(dv, dw)
-    c = wp.dot(du, n0) + wp.dot(r.u0, n1)  # f' = a s^2 + b s + c
-    b = 2.0 * (wp.dot(r.u0, n2) + wp.dot(du, n1))
-    a = 3.0 * wp.dot(du, n2)
-    d = b * b - 4.0 * a * c
-    if d <= 0.0:
-        return wp.vec2(0.0, 1.0)
-    q = -0.5 * (b + wp.sqrt(d))
-    if b < 0.0:
-        q = -0.5 * (b - wp.sqrt(d))
-    first = float(1.0)
-    if wp.abs(q) < wp.abs(a):
-        first = wp.clamp(q / a, 0.0, 1.0)
-    second = float(1.0)
-    if wp.abs(c) < wp.abs(q):
-        second = wp.clamp(c / q, 0.0, 1.0)
-    return wp.vec2(wp.min(first, second), wp.max(first, second))
-
-
-@wp.func
-def within(r: Relative, s: float) -> bool:
-    """Whether the point's foot is in the triangle."""
-    u = between(r.u0, r.u1, s)
-    v = between(r.v0, r.v1, s)
-    w = between(r.w0, r.w1, s)
-    n = wp.cross(v, w)
-    area2 = wp.dot(n, n)
-    b = wp.dot(wp.cross(u, w), n)
-    c = wp.dot(wp.cross(v, u), n)
-    least = -GROWN * area2
-    return area2 > 0.0 and b >= least and c >= least and area2 - b - c >= least
-
-
-@wp.func
-def crossing_time(r: Relative, low: float, high: float) -> float:
-    """When the point crosses the triangle while f rises or falls; NONE if it does not."""
-    outside = height(r, low) >= 0.0
-    if outside == (height(r, high) >= 0.0):
-        return NONE
-    lo = float(low)
-    hi = float(high)
-    for _halving in range(HALVINGS):
-        mid = 0.5 * (lo + hi)
-        if (height(r, mid) >= 0.0) == outside:
-            lo = mid
-        else:
-            hi = mid
-    if within(r, hi):
-        return hi
-    return NONE
 
 
 @wp.func
@@ -199,12 +116,12 @@ def is_deep(
     x1: wp.array[wp.vec3],
     p: wp.vec3,
     s: float,
-    skin: float,  # [m]
+    reach: float,  # [m]
 ) -> bool:
-    """Whether no triangle of the body is as close to p at s as the skin."""
+    """Whether no triangle of the body is as close to p at s as the reach."""
     deep = bool(True)
     t = int(0)
-    grow = wp.vec3(skin, skin, skin)
+    grow = wp.vec3(reach, reach, reach)
     root = wp.bvh_get_group_root(surface, body)
     query = wp.bvh_query_aabb(surface, p - grow, p + grow, root)
     while wp.bvh_query_next(query, t):
@@ -212,7 +129,7 @@ def is_deep(
         b = between(x0[tris[t][1]], x1[tris[t][1]], s)
         c = between(x0[tris[t][2]], x1[tris[t][2]], s)
         w = triangle_closest(p, a, b, c)
-        if wp.length(w[0] * (a - p) + w[1] * (b - p) + w[2] * (c - p)) < skin:
+        if wp.length(w[0] * (a - p) + w[1] * (b - p) + w[2] * (c - p)) < reach:
             deep = False
     return deep
 
@@ -251,15 +168,10 @@ def triangle_paths(
 def follow_points(
     # in
     bodies: wp.uint64,  # Bvh over the ways of the bodies, grouped by world
-    surface: wp.uint64,  # Bvh over the ways of the triangles, grouped by body
-    tris: wp.array[wp.vec3i],  # (n_tri,)
-    tri_body: wp.array[int],  # (n_tri,)
+    mesh: Mesh,  # its Bvh over the ways of the triangles
     ends: wp.array[wp.vec2i],  # (n_point,) a point is in the middle between two vertices
-    vert_body: wp.array[int],  # (n_vert,)
     body_world: wp.array[int],  # (n_body,)
     body_thickness: wp.array[float],  # (n_body,) [m]
-    plane_n: wp.array[wp.vec3],  # (n_plane,)
-    plane_h: wp.array[float],  # (n_plane,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m]
     x1: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
@@ -274,22 +186,22 @@ def follow_points(
     j = ends[k][1]
     p0 = 0.5 * (x0[i] + x0[j])
     p1 = 0.5 * (x1[i] + x1[j])
-    own = vert_body[i]
+    own = mesh.vert_body[i]
     inside = int(-1)
     inside_deep = int(0)
     through = int(-1)
-    for m in range(plane_n.shape[0]):
-        sunk = plane_h[m] - body_thickness[own]
-        if wp.dot(plane_n[m], p0) >= sunk and wp.dot(plane_n[m], p1) < sunk:
-            through = body_world.shape[0] + m
+    for m in range(mesh.plane_n.shape[0]):
+        sunk = mesh.plane_h[m] - body_thickness[own]
+        if wp.dot(mesh.plane_n[m], p0) >= sunk and wp.dot(mesh.plane_n[m], p1) < sunk:
+            through = mesh.n_body + m
     world = body_world[own]
     body = next_in(bodies, world, wp.min(p0, p1), wp.max(p0, p1), -1)
     while body >= 0:
         if body != own:
-            trip = trip_through(surface, body, tris, x0, x1, p0, p1)
+            trip = trip_through(mesh.bvh, body, mesh.tris, x0, x1, p0, p1)
             came = trip.came_tri
             been = int(0)
-            if entered[k] >= 0 and tri_body[entered[k]] == body:
+            if entered[k] >= 0 and mesh.tri_body[entered[k]] == body:
                 came = entered[k]
                 been = deep[k]
                 trip.came = 0.0
@@ -297,10 +209,10 @@ def follow_points(
                 out = trip.left_tri >= 0 and trip.left > trip.came
                 middle = 0.5 * (trip.came + wp.where(out, trip.left, 1.0))
                 p = between(p0, p1, middle)
-                skin = SKIN * body_thickness[body]
-                if is_deep(surface, body, tris, x0, x1, p, middle, skin):
+                deepest = DEEP * body_thickness[body]
+                if is_deep(mesh.bvh, body, mesh.tris, x0, x1, p, middle, deepest):
                     been = 1
-                if out and been == 1 and opposed(came, trip.left_tri, tris, x1):
+                if out and been == 1 and opposed(came, trip.left_tri, mesh.tris, x1):
                     through = body
                 if trip.back > trip.left:
                     inside = trip.back_tri

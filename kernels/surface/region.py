@@ -9,6 +9,9 @@ push it the other way, hence the minus sign (as printed the two would cancel):
 
 import warp as wp
 
+from warp_contact.kernels.mobility import Mobility, mobility_of
+from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -17,34 +20,32 @@ wp.set_module_options(OPTIONS)
 @wp.kernel
 def displacement_vectors(
     # in
-    start: wp.array[int],  # (n_vert + 1,)
-    entry: wp.array[int],  # (5 capacity,)
-    coef: wp.array2d[float],  # (capacity, 5)
-    normal: wp.array[wp.vec3],  # (capacity,)
-    left: wp.array[float],  # (capacity,) [m]
-    inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    graph: ContactGraph,
+    contact: wp.array[Contact],  # (capacity,)
+    residual: wp.array[float],  # (capacity,) [m]
+    bodies: Mobility,
     # out
     s: wp.array[wp.vec3],  # (n_vert,) [m], zero outside the region
 ):
     """One thread per vertex: eq. (1); an edge's end counts with its weight on the edge."""
     i = wp.tid()
     s[i] = wp.vec3(0.0, 0.0, 0.0)
-    if inv_mass[i] == 0.0:
+    if mobility_of(i, bodies) == 0.0:
         return
     own = wp.vec3(0.0, 0.0, 0.0)
     own_weight = float(0.0)
     others = wp.vec3(0.0, 0.0, 0.0)
     others_weight = float(0.0)
-    for e in range(start[i], start[i + 1]):
-        c = entry[e] // 5
-        k = entry[e] - 5 * c
-        w = wp.abs(coef[c, k])
-        if left[c] > 0.0:
+    for e in range(graph.start[i], graph.start[i + 1]):
+        c = graph.entry[e] // 5
+        k = graph.entry[e] - 5 * c
+        w = wp.abs(contact[c].coef[k])
+        if residual[c] > 0.0:
             if k < 2:
-                own += w * left[c] * normal[c]
+                own += w * residual[c] * contact[c].normal
                 own_weight += w
             else:
-                others += w * left[c] * normal[c]
+                others += w * residual[c] * contact[c].normal
                 others_weight += w
     if own_weight > 1.0:
         own = own / own_weight

@@ -29,6 +29,8 @@ import warp as wp
 
 from warp_contact.kernels.geometry import area_vector
 from warp_contact.kernels.motion.motion import corner_sum
+from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -120,8 +122,7 @@ def side_means(
     # in
     threads: int,
     n_contact: wp.array[int],  # (1,)
-    vert: wp.array2d[int],  # (capacity, 5)
-    coef: wp.array2d[float],  # (capacity, 5)
+    contact: wp.array[Contact],  # (capacity,)
     s: wp.array[wp.vec3],  # (n_vert,) [m]
     traction: wp.array[float],  # (n_vert,) [Pa]
     stiffness: wp.array[float],  # (n_vert,) [Pa]
@@ -136,9 +137,10 @@ def side_means(
         lo = wp.vec3(0.0, 0.0, 0.0)
         up_weight = float(0.0)
         lo_weight = float(0.0)
+        at = contact[c]
         for k in range(5):
-            i = vert[c, k]
-            w = wp.abs(coef[c, k])
+            i = at.vert[k]
+            w = wp.abs(at.coef[k])
             if w > 0.0 and wp.length_sq(s[i]) > 0.0:
                 value = wp.vec3(traction[i], stiffness[i], fraction[i])
                 if k < 2:
@@ -154,10 +156,9 @@ def side_means(
 @wp.func
 def opposite(
     i: int,
-    start: wp.array[int],
-    entry: wp.array[int],
-    coef: wp.array2d[float],
-    left: wp.array[float],
+    graph: ContactGraph,
+    contact: wp.array[Contact],
+    residual: wp.array[float],
     upper: wp.array[wp.vec3],
     lower: wp.array[wp.vec3],
 ) -> wp.vec4:
@@ -170,11 +171,11 @@ def opposite(
     own = wp.vec3(0.0, 0.0, 0.0)
     own_weight = float(0.0)
     rigid = bool(False)
-    for e in range(start[i], start[i + 1]):
-        c = entry[e] // 5
-        k = entry[e] - 5 * c
-        w = wp.abs(coef[c, k])
-        if left[c] > 0.0:
+    for e in range(graph.start[i], graph.start[i + 1]):
+        c = graph.entry[e] // 5
+        k = graph.entry[e] - 5 * c
+        w = wp.abs(contact[c].coef[k])
+        if residual[c] > 0.0:
             if k < 2:
                 own += w * lower[c]
                 own_weight += w
@@ -198,10 +199,9 @@ def opposite(
 def correct_balance(
     # in
     anew: bool,  # start from the stiffnesses, not from the fraction so far
-    start: wp.array[int],  # (n_vert + 1,)
-    entry: wp.array[int],  # (5 capacity,)
-    coef: wp.array2d[float],  # (capacity, 5)
-    left: wp.array[float],  # (capacity,) [m]
+    graph: ContactGraph,
+    contact: wp.array[Contact],  # (capacity,)
+    residual: wp.array[float],  # (capacity,) [m]
     upper: wp.array[wp.vec3],  # (capacity,)
     lower: wp.array[wp.vec3],  # (capacity,)
     s: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -214,7 +214,7 @@ def correct_balance(
     i = wp.tid()
     if wp.length_sq(s[i]) == 0.0:
         return
-    other = opposite(i, start, entry, coef, left, upper, lower)
+    other = opposite(i, graph, contact, residual, upper, lower)
     if other[2] == RIGID:
         fraction[i] = 1.0
         return
@@ -229,10 +229,9 @@ def correct_balance(
 @wp.kernel
 def meet(
     # in
-    start: wp.array[int],  # (n_vert + 1,)
-    entry: wp.array[int],  # (5 capacity,)
-    coef: wp.array2d[float],  # (capacity, 5)
-    left: wp.array[float],  # (capacity,) [m]
+    graph: ContactGraph,
+    contact: wp.array[Contact],  # (capacity,)
+    residual: wp.array[float],  # (capacity,) [m]
     upper: wp.array[wp.vec3],  # (capacity,) of the solutions
     lower: wp.array[wp.vec3],  # (capacity,)
     s: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -243,7 +242,7 @@ def meet(
     i = wp.tid()
     if wp.length_sq(s[i]) == 0.0:
         return
-    other = opposite(i, start, entry, coef, left, upper, lower)
+    other = opposite(i, graph, contact, residual, upper, lower)
     if other[2] != RIGID:
         fraction[i] = 0.5 * (fraction[i] + 1.0 - other[2])
 
@@ -252,10 +251,9 @@ def meet(
 def bisect(
     # in
     step: float,  # 2^-(k + 2)
-    start: wp.array[int],  # (n_vert + 1,)
-    entry: wp.array[int],  # (5 capacity,)
-    coef: wp.array2d[float],  # (capacity, 5)
-    left: wp.array[float],  # (capacity,) [m]
+    graph: ContactGraph,
+    contact: wp.array[Contact],  # (capacity,)
+    residual: wp.array[float],  # (capacity,) [m]
     upper: wp.array[wp.vec3],  # (capacity,)
     lower: wp.array[wp.vec3],  # (capacity,)
     s: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -267,7 +265,7 @@ def bisect(
     i = wp.tid()
     if wp.length_sq(s[i]) == 0.0:
         return
-    other = opposite(i, start, entry, coef, left, upper, lower)
+    other = opposite(i, graph, contact, residual, upper, lower)
     if other[2] == RIGID or wp.max(other[0], 0.0) > wp.max(force[i], 0.0):
         fraction[i] = fraction[i] + step
     else:

@@ -1,8 +1,16 @@
-"""What may touch, for as many steps as it holds."""
+"""Which pairs may touch, for as many steps as that holds."""
 
 from dataclasses import dataclass
 
 import warp as wp
+
+from warp_contact.data import boxes
+from warp_contact.data.model import Model
+from warp_contact.data.overflow import Capacity
+from warp_contact.kernels.broad_phase.near import MANY, Near, NearPart
+from warp_contact.kernels.broad_phase.pairs import PairList
+
+LEAF = 8  # triangles in a leaf: to ask for the few near a vertex takes a quarter less than with 1
 
 
 @dataclass
@@ -10,63 +18,156 @@ class Pairs:
     """Vertices (or edges) and the bodies whose tets (or triangles) they may come to meet.
 
     Attributes:
-        n: number of pairs, shape (1,)
-        pair: owner and body, in this order, shape (capacity,)
-        start: first pair of each owner, shape (n_owner + 1,)
-        items: first and end of each pair in ``item``, shape (capacity,)
-        item: tets or triangles, ascending for each owner, shape (capacity of items,)
+        list: the pairs and their items
         item_start: first item of each owner, shape (n_owner + 1,)
-        wake: way of owner and body up to which they do not meet [m], shape (capacity,)
+        clear_until: way travelled by owner and body up to which they do not meet [m],
+            shape (capacity,)
     """
 
-    n: wp.array
-    pair: wp.array
-    start: wp.array
-    items: wp.array
-    item: wp.array
-    item_start: wp.array
-    wake: wp.array
+    list: PairList
+    item_start: wp.array[int]
+    clear_until: wp.array[float]
+
+    @property
+    def n(self) -> wp.array[int]:
+        """Number of pairs, shape (1,)."""
+        return self.list.n
 
 
 @dataclass
-class Candidates:
+class BroadPhase:
     """What may touch as long as no vertex is further than the skin from where it was then.
 
     Attributes:
-        x: positions of the candidates [m], shape (n_vert,)
+        x: positions at which the pairs were found [m], shape (n_vert,)
         free: how far from them a prediction may be [m], shape (n_body,)
-        skin: how far from them they hold [m], shape (n_body,)
+        skin: how far from them the pairs hold [m], shape (n_body,)
         motion: largest motion of each body since the last look [m], shape (n_body,)
-        pace: what motion to expect in the next looks [m], shape (n_body,)
-        fastest: largest of the motions when they were found [m], shape (1,)
-        total: their sum, in counts of kernels/broad_phase/margins.py, shape (1,)
-        stale: whether they have to be found again, shape (1,)
-        edge: shortest mean edge of a body [m]
+        recent: largest of the last motions, older ones count less [m], shape (n_body,)
+        fastest: largest of the motions when the pairs were found [m], shape (1,)
+        total: their sum, in counts of skins.py, shape (1,)
+        stale: whether the pairs have to be found again, shape (1,)
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
-        some: whether there are any, shape (1,)
+        any_pair: whether there are any, shape (1,)
         last: positions of the last look [m], shape (n_vert,)
-        way: sum of the motions since the candidates were found [m], shape (n_body + n_plane,)
+        travelled: sum of the motions since the pairs were found [m], shape (n_body + n_plane,)
         n_found: length of the list that is being filled, shape (1,)
         vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
+        near: the bodies that may touch a body
         near_tri: triangles in the slabs of near bodies, shape (capacity.near,)
+        lower, upper: boxes of the bodies [m], shape (n_body,)
+        tri_lower, tri_upper: boxes of the triangles [m], shape (n_tri,)
+        bodies: Bvh over the bodies, grouped by world
+        surface: Bvh over the triangles, grouped by body
+        key: hash of each vertex' cell, -1 for none, shape (n_vert,)
+        cell_start: first vertex of each cell, shape (n_cell + 1,)
+        cell_vert: vertices by cell, shape (n_vert,)
     """
 
-    x: wp.array
-    free: wp.array
-    skin: wp.array
-    motion: wp.array
-    pace: wp.array
-    fastest: wp.array
-    total: wp.array
-    stale: wp.array
-    edge: float
+    x: wp.array[wp.vec3]
+    free: wp.array[float]
+    skin: wp.array[float]
+    motion: wp.array[float]
+    recent: wp.array[float]
+    fastest: wp.array[float]
+    total: wp.array[int]
+    stale: wp.array[int]
     verts: Pairs
     edges: Pairs
-    some: wp.array
-    last: wp.array
-    way: wp.array
-    n_found: wp.array
-    vert_tet: wp.array
-    edge_tri: wp.array
-    near_tri: wp.array
+    any_pair: wp.array[int]
+    last: wp.array[wp.vec3]
+    travelled: wp.array[float]
+    n_found: wp.array[int]
+    vert_tet: wp.array[wp.vec2i]
+    edge_tri: wp.array[wp.vec2i]
+    near: Near
+    near_tri: wp.array[int]
+    lower: wp.array[wp.vec3]
+    upper: wp.array[wp.vec3]
+    tri_lower: wp.array[wp.vec3]
+    tri_upper: wp.array[wp.vec3]
+    bodies: wp.Bvh
+    surface: wp.Bvh
+    key: wp.array[int]
+    cell_start: wp.array[int]
+    cell_vert: wp.array[int]
+
+
+def allocate(model: Model, x: wp.array[wp.vec3], capacity: Capacity) -> BroadPhase:
+    """Nothing was found yet; the Bvhs are built around ``x``."""
+    n, n_body = model.n_vert, model.n_body
+    trees = _trees(model, x)
+    return BroadPhase(
+        x=wp.zeros(n, dtype=wp.vec3),
+        free=wp.zeros(n_body, dtype=float),
+        skin=wp.zeros(n_body, dtype=float),
+        motion=wp.zeros(n_body, dtype=float),
+        recent=wp.zeros(n_body, dtype=float),
+        fastest=wp.zeros(1, dtype=float),
+        total=wp.zeros(1, dtype=int),
+        stale=wp.full(1, 1, dtype=int),
+        verts=_pairs(n, capacity.verts, capacity.tets),
+        edges=_pairs(model.n_edge, capacity.edges, capacity.tris),
+        any_pair=wp.zeros(1, dtype=int),
+        last=wp.zeros(n, dtype=wp.vec3),
+        travelled=wp.zeros(n_body + model.n_plane, dtype=float),
+        n_found=wp.zeros(1, dtype=int),
+        vert_tet=wp.zeros(capacity.tets, dtype=wp.vec2i),
+        edge_tri=wp.zeros(capacity.tris, dtype=wp.vec2i),
+        near_tri=wp.zeros(capacity.near, dtype=int),
+        key=wp.zeros(n, dtype=int),
+        cell_start=wp.zeros(2 * n + 2, dtype=int),
+        cell_vert=wp.zeros(n, dtype=int),
+        **trees,
+    )
+
+
+def _trees(model: Model, x: wp.array[wp.vec3]) -> dict:
+    """Boxes of bodies and triangles at ``x``, the Bvhs over them, and the lists of near bodies."""
+    skin, n_near = wp.zeros(model.n_body, dtype=float), wp.full(model.n_body, 1, dtype=int)
+    lower, upper = (wp.zeros(model.n_body, dtype=wp.vec3) for _ in range(2))
+    tri_lower, tri_upper = (wp.zeros(model.n_tri, dtype=wp.vec3) for _ in range(2))
+    boxes.of_bodies(model, x, skin, lower, upper)
+    boxes.of_triangles(model, x, skin, n_near, tri_lower, tri_upper)
+    bodies = wp.Bvh(lower, upper, groups=model.body_world)
+    return {
+        "lower": lower,
+        "upper": upper,
+        "tri_lower": tri_lower,
+        "tri_upper": tri_upper,
+        "bodies": bodies,
+        "surface": wp.Bvh(tri_lower, tri_upper, groups=model.tri_body, leaf_size=LEAF),
+        "near": _near(model, bodies, lower, upper, n_near),
+    }
+
+
+def _near(
+    model: Model,
+    bodies: wp.Bvh,
+    lower: wp.array[wp.vec3],
+    upper: wp.array[wp.vec3],
+    n_near: wp.array[int],
+) -> Near:
+    shape = model.n_body, int(MANY)
+    near = Near()
+    near.bodies, near.world = bodies.id, model.body_world
+    near.lower, near.upper = lower, upper
+    near.n_near, near.near = n_near, wp.zeros(shape, dtype=int)
+    near.slab, near.end = wp.zeros(shape, dtype=wp.vec4), wp.zeros(shape, dtype=float)
+    near.part = wp.zeros(shape, dtype=NearPart)
+    return near
+
+
+def _pairs(n_owner: int, n_pair: int, n_item: int) -> Pairs:
+    pairs = PairList()
+    pairs.n = wp.zeros(1, dtype=int)
+    pairs.pair = wp.zeros(n_pair, dtype=wp.vec2i)
+    pairs.start = wp.zeros(n_owner + 1, dtype=int)
+    pairs.items = wp.zeros(n_pair, dtype=wp.vec2i)
+    pairs.item = wp.zeros(n_item, dtype=int)
+    return Pairs(
+        list=pairs,
+        item_start=wp.zeros(n_owner + 1, dtype=int),
+        clear_until=wp.zeros(n_pair, dtype=float),
+    )

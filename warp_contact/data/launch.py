@@ -1,9 +1,13 @@
-"""Launches over lists of which a part is in use, or has much to do.
+"""Launches over lists of which a part is in use, and stages that run on a condition.
 
-On the CPU threads run one after another, and each loads all arguments of its kernel first: more
-than an unused entry is worth. Kernels over lists therefore take the number of their threads and
-let each have every so-manieth entry: on the CPU one thread has them all, on a GPU each has its own.
+On the CPU threads run one after another, and each loads all arguments of its kernel first, which
+costs more than an unused entry of a list is worth. Kernels over lists therefore take the number of
+their threads, and each thread takes every entry that lies that many behind the one before: on the
+CPU one thread has them all, on a GPU each has its own.
 """
+
+from collections.abc import Callable
+from functools import partial
 
 import warp as wp
 
@@ -12,3 +16,16 @@ def launch_over(kernel: wp.Kernel, n: int, inputs: list, outputs: list) -> None:
     """Launch ``kernel``, whose first argument is the number of threads, over ``n`` entries."""
     threads = 1 if wp.get_device().is_cpu else n
     wp.launch(kernel, dim=threads, inputs=[threads, *inputs], outputs=outputs)
+
+
+def if_any(flag: wp.array, stage: Callable, *arguments, otherwise: Callable | None = None) -> None:
+    """Run a stage with its arguments where ``flag``, shape (1,), is not 0; else ``otherwise``.
+
+    The device decides, so that the whole can be captured. ``otherwise`` takes no arguments.
+    """
+    wp.capture_if(flag, partial(stage, *arguments), otherwise)
+
+
+def while_any(flag: wp.array, stage: Callable, *arguments) -> None:
+    """Run a stage again and again as long as ``flag``, shape (1,), is not 0."""
+    wp.capture_while(flag, partial(stage, *arguments))

@@ -4,7 +4,7 @@ from dataclasses import astuple
 
 import numpy as np
 
-from warp_contact.data.contacts import Capacity
+from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import Work
 
 
@@ -14,7 +14,7 @@ def enlarged(work: Work) -> Capacity | None:
     What is more than half full then grows too: lists grow together, and each time that one does not
     fit its frame is lost.
     """
-    needed = work.contacts.needed.numpy()
+    needed = work.overflow.all.numpy()
     if not needed.any():
         return None
     have = np.array(astuple(work.capacity))
@@ -24,9 +24,9 @@ def enlarged(work: Work) -> Capacity | None:
 
 def _used(work: Work) -> np.ndarray:
     """What the last step used, or the last that used any, in the order of ``Capacity``."""
-    verts, edges = work.candidates.verts, work.candidates.edges
+    verts, edges = work.broad_phase.verts, work.broad_phase.edges
     counts = [work.contacts.n, verts.n, verts.item_start[-1:], edges.n, edges.item_start[-1:]]
     contacts, n_vert, n_tet, n_edge, n_tri = (int(n.numpy()[0]) for n in counts)
-    pairs = int((work.pair_key.numpy() >= 0).sum())
-    near = int(work.near.tris.numpy().max(initial=0))
+    pairs = int((work.forces.pair_key.numpy() >= 0).sum())
+    near = int(work.broad_phase.near.part.numpy()["tris"].max(initial=0))
     return np.array([contacts, pairs, n_vert, n_tet, n_edge, n_tri, near])

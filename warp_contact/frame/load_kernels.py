@@ -3,19 +3,25 @@
 import warp as wp
 
 from warp_contact.data.model import Model
-from warp_contact.kernels.broad_phase import bounds, edges, hashing, margins, near, pairs
+from warp_contact.kernels.broad_phase import bounds, edges, hashing, near, pairs, skins
 from warp_contact.kernels.elastic import shape
-from warp_contact.kernels.impulse import impulse, pair_impulses, persistent, warm_start
+from warp_contact.kernels.impulse import constraint, impulse, pair_impulses, warm_start
 from warp_contact.kernels.motion import lanczos, motion
-from warp_contact.kernels.narrow_phase import contact_graph, depth, vertex_contact, vertices
+from warp_contact.kernels.narrow_phase import (
+    contact_graph,
+    depth,
+    persistent,
+    vertex_contact,
+    vertices,
+)
 from warp_contact.kernels.narrow_phase import edges as crossing
-from warp_contact.kernels.surface import closure
+from warp_contact.kernels.surface import closure, residual
 
 # What a frame of any scene uses. The search for overlaps at the start, other responses, sleep and
 # measuring are left out: many scenes do without.
-ALWAYS = (bounds, edges, hashing, margins, near, pairs, shape, lanczos, motion, closure)
-ALWAYS += (impulse, pair_impulses, persistent, warm_start)
-ALWAYS += (contact_graph, crossing, depth, vertex_contact, vertices)
+ALWAYS = (bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure)
+ALWAYS += (constraint, impulse, pair_impulses, warm_start, residual)
+ALWAYS += (contact_graph, crossing, depth, persistent, vertex_contact, vertices)
 
 
 def load_kernels(model: Model, device: wp.Device) -> None:

@@ -1,6 +1,6 @@
 """Bodies that are at rest sleep: nothing is computed for them until something comes near.
 
-What sleeps stays within ``kernels.rest.STILL`` of an edge of where it was ``REST_TIME`` before; the
+What sleeps stays within ``STILL`` of an edge of where it was ``REST_TIME`` before; the
 contact forces and pressures on it are those of its last frame awake, and it counts no contacts.
 Momentum and energy change by what motion it had left. What creeps slower than ``STILL`` in
 ``REST_TIME`` is stopped, but for what moves because fixed vertices do. ``Simulation.set_velocity``
@@ -14,15 +14,17 @@ import math
 import numpy as np
 import warp as wp
 
+from warp_contact.data import boxes
+from warp_contact.data.contact_forces import ContactForces
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
-from warp_contact.data.work import Work, launch_body_boxes
+from warp_contact.data.work import Work
 from warp_contact.kernels.motion import sleeping as kernels
 
 REST_TIME = 0.5  # s that a body has to be at rest before it may sleep
 
 
-class Rest:
+class Sleeping:
     """Knows for how long each body has been at rest; its ``awake`` says who moves."""
 
     def __init__(self, model: Model, state: State, fps: float):
@@ -46,7 +48,7 @@ class Rest:
     def values(self, work: Work) -> dict[str, np.ndarray]:
         """What another one needs to go on from here."""
         awake = np.append(self.awake.bodies.numpy() == 1, np.zeros(self.model.n_plane, dtype=bool))
-        key, total = work.pair_key.numpy(), work.pair_total.numpy()
+        key, total = work.forces.pair_key.numpy(), work.forces.pair_total.numpy()
         key, total = key[key >= 0], total[key >= 0]
         kept = ~awake[key >> 32] & ~awake[key & 0xFFFFFFFF]
         asleep = ~awake[self.model.vert_body.numpy()]
@@ -54,7 +56,7 @@ class Rest:
             "anchor": self._anchor.numpy(),
             "frames": self._frames.numpy(),
             "awake": self.awake.bodies.numpy(),
-            "impulse": np.where(asleep[:, None], work.impulse.numpy(), np.float32(0.0)),
+            "impulse": np.where(asleep[:, None], work.forces.received.numpy(), np.float32(0.0)),
             "pair_key": key[kept],
             "pair_total": total[kept],
         }
@@ -67,10 +69,10 @@ class Rest:
         self.awake.bodies.assign(values["awake"])
         self._before = values["awake"]
         self._pause(work)
-        work.impulse.assign(values["impulse"])
+        work.forces.received.assign(values["impulse"])
         if n:
-            work.pair_key[:n].assign(values["pair_key"])
-            work.pair_total[:n].assign(values["pair_total"])
+            work.forces.pair_key[:n].assign(values["pair_key"])
+            work.forces.pair_total[:n].assign(values["pair_total"])
 
     def wake(self, body: int) -> None:
         """Let a body's rest begin anew."""
@@ -111,8 +113,9 @@ class Rest:
         bodies = awake.bodies.numpy()
         if bodies.all() and self._before.all():
             return True
-        launch_body_boxes(model, state.x, self._reach, work.lower, work.upper)
-        work.bodies.rebuild()
+        broad = work.broad_phase
+        boxes.of_bodies(model, state.x, self._reach, broad.lower, broad.upper)
+        broad.bodies.rebuild()
         self._again.fill_(1)
         wp.capture_while(self._again, lambda: self._wake(work))
         bodies = awake.bodies.numpy()
@@ -122,21 +125,22 @@ class Rest:
         return bool(bodies.any())
 
     def _pause(self, work: Work) -> None:
-        """Let the tets know, and find new candidates."""
+        """Let the tets know, and look for pairs anew."""
         wp.launch(
             kernels.pause_tets,
             dim=self.model.n_tet,
             inputs=[self.model.tet_body, self.awake.bodies],
             outputs=[self.awake.tets],
         )
-        work.candidates.stale.fill_(1)
+        work.broad_phase.stale.fill_(1)
 
     def _wake(self, work: Work) -> None:
+        broad = work.broad_phase
         self._again.zero_()
         wp.launch(
             kernels.wake_island,
             dim=self.model.n_body,
-            inputs=[work.bodies.id, self.model.body_world, work.lower, work.upper, self._mobile],
+            inputs=[broad.bodies.id, self.model.body_world, broad.lower, broad.upper, self._mobile],
             outputs=[self.awake.bodies, self._again],
         )
 
@@ -152,19 +156,19 @@ class Rest:
             kernels.pause_vertices,
             dim=model.n_vert,
             inputs=[model.vert_body, model.inv_mass, awake.bodies],
-            outputs=[awake.inv_mass, state.v, work.impulse],
+            outputs=[awake.inv_mass, state.v, work.forces.received],
         )
         wp.launch(
             kernels.clear_pairs,
-            dim=work.pair_key.shape[0],
+            dim=work.forces.pair_key.shape[0],
             inputs=[awake.bodies],
-            outputs=[work.pair_key, work.pair_total],
+            outputs=[work.forces.pair_key, work.forces.pair_total],
         )
 
 
-def keep_forces(impulse: wp.array, pair_key: wp.array, pair_total: wp.array, after: Work) -> None:
+def keep_forces(before: ContactForces, after: ContactForces) -> None:
     """Copy the contact forces of the last frame, which those asleep still have, to a larger one."""
-    n = pair_key.shape[0]
-    wp.copy(after.impulse, impulse)
-    wp.copy(after.pair_key[:n], pair_key)
-    wp.copy(after.pair_total[:n], pair_total)
+    n = before.pair_key.shape[0]
+    wp.copy(after.received, before.received)
+    wp.copy(after.pair_key[:n], before.pair_key)
+    wp.copy(after.pair_total[:n], before.pair_total)

@@ -7,15 +7,16 @@ import numpy as np
 import warp as wp
 
 from warp_contact.data import warm_start
-from warp_contact.data.contacts import Capacity
 from warp_contact.data.model import Model
+from warp_contact.data.overflow import Capacity
 from warp_contact.data.state import State
 from warp_contact.data.work import Work, allocate_work
 from warp_contact.errors import SimulationError
 from warp_contact.frame import checkpoint
 from warp_contact.frame.capacity import enlarged
 from warp_contact.frame.diagnosis import flattest_tet, lost_vertex, vertex_name
-from warp_contact.frame.sleeping import Rest, keep_forces
+from warp_contact.frame.overlap import overlaps
+from warp_contact.frame.sleeping import Sleeping, keep_forces
 from warp_contact.frame.spectrum import Spectrum
 from warp_contact.frame.step_bounds import (
     CUT_SHORT,
@@ -26,8 +27,9 @@ from warp_contact.frame.step_bounds import (
     stays_stable,
 )
 from warp_contact.frame.step_count import Pace
-from warp_contact.step import step
 from warp_contact.step.forces import share_for, stages_for
+from warp_contact.step.loop import step_of, take_steps
+from warp_contact.step.motion import kick
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 NEIGHBOURS = 8  # pairs with a contact force for each body that there is room for at first
@@ -74,15 +76,15 @@ class Stepper:
         self.spectrum = Spectrum(model)
         # Without weight, what hardly moves need not be held by anything: it flies.
         sleeping = sleeping and any(model.gravity)
-        self.rest = Rest(model, state, fps) if sleeping else None
+        self.rest = Sleeping(model, state, fps) if sleeping else None
+        inv_mass = model.inv_mass.numpy()
+        mobile = float(model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
+        self.unit = UNIT * (mobile if mobile > 0.0 else 1.0)
         pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
         self.work: Work = self._allocate(Capacity(pairs=pairs))
         self._graphs: dict[tuple[int, bool], wp.Graph] = {}
         self._saved = State(wp.clone(state.x), wp.clone(state.v))
         self._saved_warm = warm_start.allocate(model.n_vert, self.work.capacity.contacts)
-        inv_mass = model.inv_mass.numpy()
-        mobile = float(model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
-        self.unit = UNIT * (mobile if mobile > 0.0 else 1.0)
 
     def step(self, frame: int) -> None:
         """Step frame number ``frame``.
@@ -103,7 +105,7 @@ class Stepper:
         wp.copy(self._saved.v, self._state.v)
         warm_start.copy(self._saved_warm, self.work.warm)
         while self.search is None or self.grow():
-            self.search = step.overlaps(self._model, self._state, self.work)
+            self.search = overlaps(self._model, self._state, self.work)
         omega, rate = self.rates or self.spectrum.rates(self._state.x)
         self._pace.check(self._state, omega, frame)
         last, halved = self.n, 0
@@ -130,7 +132,7 @@ class Stepper:
             raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
         self.rates = after
         self.dt = dt
-        self.search = self.search and bool(self.work.deep_found.numpy()[0])
+        self.search = self.search and bool(self.work.surface.was_old.numpy()[0])
 
     def _look(self) -> tuple[tuple[float, float], str]:
         """Rates of the present state [1/s], and what is wrong with it: empty where nothing is."""
@@ -162,6 +164,7 @@ class Stepper:
     def use(self, work: Work) -> None:
         """Go on in other buffers."""
         self.work = work
+        work.forces.unit = self.unit
         self._graphs.clear()
 
     def grow(self) -> bool:
@@ -170,10 +173,10 @@ class Stepper:
         if capacity is None:
             return False
         self._go_back()
-        forces = self.work.impulse, self.work.pair_key, self.work.pair_total
+        forces = self.work.forces
         self._replace_work(capacity)
         if self.rest:
-            keep_forces(*forces, self.work)
+            keep_forces(forces, self.work.forces)
         return True
 
     def values(self) -> dict[str, np.ndarray]:
@@ -199,7 +202,7 @@ class Stepper:
         impulses = checkpoint.part(values, "warm")
         have = self.work.capacity
         pairs = max(have.pairs, len(rest.get("pair_key", ())))
-        contacts = max(have.contacts, len(impulses["held"]))
+        contacts = max(have.contacts, len(impulses["edges"]))
         self._replace_work(replace(have, pairs=pairs, contacts=contacts))
         warm_start.restore(self.work.warm, impulses)
         if self.rest:
@@ -220,20 +223,20 @@ class Stepper:
         if self.rest:
             self.rest.begin_frame(self._state, work)
         else:
-            work.impulse.zero_()
-            work.pair_key.fill_(-1)
-            work.pair_total.zero_()
+            work.forces.received.zero_()
+            work.forces.pair_key.fill_(-1)
+            work.forces.pair_total.zero_()
         n = self._pace.steps(self._state, omega, last, frame, bool(self.search))
         dt = 1.0 / (self.fps * n)
         stages = stages_for(rate, dt)
         if self.dt is not None and dt != self.dt:
             work.dt.fill_(0.5 * (self.dt - dt))
-            step.kick(self._model, self._state, work)  # velocities lag by half a step
+            kick(self._model, self._state, work)  # velocities lag by half a step
         work.dt.fill_(dt)
         work.share.fill_(share_for(rate, dt))
-        work.contacts.needed.zero_()
-        work.deep_found.zero_()
-        work.bodies.rebuild()
+        work.overflow.all.zero_()
+        work.surface.was_old.zero_()
+        work.broad_phase.bodies.rebuild()
         self.n = n
         after, wrong = NO_RATES, ""
         part = PART if in_parts else n
@@ -251,15 +254,15 @@ class Stepper:
         """The captured steps of a frame, with so many stages of damping."""
         key = stages, self.search
         if key not in self._graphs:
-            arguments = self._model, self._state, self.work, self._response, *key, self.unit
+            one = step_of(self._response, bool(self.search))
             with wp.ScopedCapture() as capture:
-                step.steps(*arguments)
+                take_steps(self._model, self._state, self.work, stages, one)
             self._graphs[key] = capture.graph
         return self._graphs[key]
 
     def _allocate(self, capacity: Capacity) -> Work:
         awake = self.rest.awake if self.rest else None
-        return allocate_work(self._model, self._state, capacity, awake)
+        return allocate_work(self._model, self._state, capacity, awake, self.unit)
 
     def _replace_work(self, capacity: Capacity) -> None:
         """Allocate anew; old and new buffers at once would be the peak of the memory."""

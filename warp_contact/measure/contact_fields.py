@@ -9,17 +9,15 @@ from warp_contact.data.work import Work
 
 def contact_fields(model: Model, x: wp.array, work: Work, duration: float) -> dict[str, np.ndarray]:
     """Fields of the last frame, of ``duration`` [s], at positions ``x``: see ``Simulation``."""
-    c = work.contacts
-    n = int(c.n.numpy()[0])
-    vert, coef = c.vert.numpy()[:n], c.coef.numpy()[:n]
-    pair, depth = c.pair.numpy()[:n], c.depth.numpy()[:n]
+    c = work.contacts.record.numpy()[: int(work.contacts.n.numpy()[0])]
+    vert, coef, pair, depth = c["vert"], c["coef"], c["pair"], c["depth"]
     penetration = np.zeros(model.n_vert, dtype=np.float32)
     partner = np.full(model.n_vert, -1, dtype=np.int32)
     for k in range(5):
         on = coef[:, k] != 0.0
         np.maximum.at(penetration, vert[on, k], depth[on])
         partner[vert[on, k]] = pair[on, 1 if k < 2 else 0]
-    impulse = np.linalg.norm(work.impulse.numpy(), axis=1)
+    impulse = np.linalg.norm(work.forces.received.numpy(), axis=1)
     pressure = impulse / (duration * np.maximum(vertex_area(model, x), 1e-30))
     return {
         "pressure": pressure.astype(np.float32),

@@ -8,10 +8,10 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
-from warp_contact.kernels.broad_phase import bounds
 from warp_contact.kernels.motion import motion
 from warp_contact.kernels.output import measure as kernels
-from warp_contact.kernels.output import tunnelling
+from warp_contact.measure.trees import Trees
+from warp_contact.measure.tunnelling import Tunnelling
 from warp_contact.scene import topology
 from warp_contact.step.forces import energies, internal_forces
 
@@ -75,7 +75,8 @@ class Measure:
 class Meter:
     """Measures states of one model; its memory is allocated at the first use.
 
-    It remembers the last state it measured, to tell what went through what since then.
+    Attributes:
+        tunnelling: remembers the last state measured, to tell what went through what since then
     """
 
     def __init__(self, model: Model):
@@ -85,31 +86,10 @@ class Meter:
         self.names = [*model.labels, *(f"plane{p}" for p in range(model.n_plane))]
         self._tets = model.tets.numpy()
         self._volume = model.volume.numpy()
-        self._bvhs = self._last = None
-        self._tunnelled, self._tunnelled_pair = 0, None
+        self._trees = Trees(model)
+        self.tunnelling = Tunnelling(model, self.names, self._trees)
 
-    def memory(self) -> dict[str, np.ndarray]:
-        """What it remembers of the states measured so far."""
-        if self._last is None:
-            return {}
-        kept = {"last": self._last, "entered": self._entered, "deep": self._deep}
-        memory = {name: array.numpy() for name, array in kept.items()}
-        return memory | {
-            "tunnelled": np.array(self._tunnelled),
-            "tunnelled_pair": np.array(self._tunnelled_pair or (), dtype=str),
-        }
-
-    def remember(self, memory: dict[str, np.ndarray]) -> None:
-        """Go on from the ``memory`` of another meter of the same model."""
-        if not memory:
-            return
-        self._begin(wp.array(memory["last"], dtype=wp.vec3))
-        self._entered.assign(memory["entered"])
-        self._deep.assign(memory["deep"])
-        self._tunnelled = int(memory["tunnelled"])
-        self._tunnelled_pair = tuple(memory["tunnelled_pair"].tolist()) or None
-
-    def measure(self, state: State, work: Work, unit: float, duration: float, dt: float) -> Measure:
+    def measure(self, state: State, work: Work, duration: float, dt: float) -> Measure:
         """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s]."""
         model = self.model
         x = state.x.numpy().astype(np.float64)
@@ -118,7 +98,7 @@ class Meter:
         energies(model, state.x, energy)
         p = self.mass[:, None] * v
         ratio = topology.signed_volumes(x, self._tets) / self._volume
-        self.follow(state.x)
+        self.tunnelling.follow(state.x)
         overlap, pair, unheld = self.overlap(state.x, work)
         return Measure(
             kinetic=float(0.5 * (p * v).sum() + 0.5 * dt * (self._forces(state.x) * v).sum()),
@@ -128,13 +108,13 @@ class Meter:
             angular_momentum=np.cross(x, p).sum(axis=0),
             overlap=overlap,
             overlap_pair=pair,
-            n_contacts=int((work.contacts.coef.numpy()[: self._n(work)] != 0.0).any(1).sum()),
+            n_contacts=int((_contacts(work)["coef"] != 0.0).any(1).sum()),
             volume_ratio=float(ratio.min()),
             inverted=int((ratio <= 0.0).sum()),
-            tunnelled=self._tunnelled,
-            tunnelled_pair=self._tunnelled_pair,
+            tunnelled=self.tunnelling.count,
+            tunnelled_pair=self.tunnelling.pair,
             unheld=unheld if duration > 0.0 else 0,
-            forces=self.forces(work, unit, duration),
+            forces=self.forces(work, duration),
         )
 
     def _forces(self, x: wp.array) -> np.ndarray:
@@ -152,10 +132,10 @@ class Meter:
         total = f.numpy() + self.mass[:, None] * np.array(model.gravity)
         return np.where(model.inv_mass.numpy()[:, None] > 0.0, total, 0.0)
 
-    def forces(self, work: Work, unit: float, duration: float) -> dict[tuple[str, str], float]:
+    def forces(self, work: Work, duration: float) -> dict[tuple[str, str], float]:
         """Mean force between the bodies of each touching pair [N], in the order of the bodies."""
-        key = work.pair_key.numpy()
-        total = work.pair_total.numpy() * unit
+        key = work.forces.pair_key.numpy()
+        total = work.forces.pair_total.numpy() * work.forces.unit
         out = {}
         for k in np.argsort(key):
             if key[k] >= 0 and duration > 0.0:
@@ -166,22 +146,20 @@ class Meter:
     def overlap(self, x: wp.array, work: Work) -> tuple[float, tuple[str, str] | None, int]:
         """Deepest overlap [m], the labels of its bodies, and the vertices that nothing holds."""
         model = self.model
-        bodies, surface, volumes = self._refit(x, x)
+        trees = self._trees
+        trees.refit(x, x)
         at_vert = wp.zeros(model.n_surf, dtype=float), wp.zeros(model.n_surf, dtype=int)
         at_edge = wp.zeros(model.n_edge, dtype=float), wp.zeros(model.n_edge, dtype=int)
         wp.launch(
             kernels.vertex_overlaps,
             dim=model.n_surf,
-            inputs=[volumes.id, surface.id, model.surf, model.tets, model.tris]
-            + [model.vert_body, model.body_world, model.body_edge]
-            + [model.plane_n, model.plane_h, x],
+            inputs=[trees.volumes.id, trees.mesh, model.surf, model.body_world, x],
             outputs=list(at_vert),
         )
         wp.launch(
             kernels.edge_overlaps,
             dim=model.n_edge,
-            inputs=[bodies.id, surface.id, model.tris, model.edges, model.vert_body]
-            + [model.body_world, model.body_edge, x],
+            inputs=[trees.bodies.id, trees.mesh, model.body_world, x],
             outputs=list(at_edge),
         )
         depth = np.concatenate([at_vert[0].numpy(), at_edge[0].numpy()])
@@ -193,88 +171,17 @@ class Meter:
         own = model.vert_body.numpy()[first]
         awake = work.awake.bodies.numpy()[own] == 1  # the others are held
         deep = awake & (depth > UNHELD * model.body_edge.numpy()[own])
-        unheld = np.setdiff1d(first[: model.n_surf][deep[: model.n_surf]], self._held(work))
+        unheld = np.setdiff1d(first[: model.n_surf][deep[: model.n_surf]], _held(work))
         return float(depth[k]), (self.names[own[k]], self.names[partner[k]]), len(unheld)
 
-    def _held(self, work: Work) -> np.ndarray:
-        """Vertices that a contact of the last step moved out of another body or plane."""
-        n = self._n(work)
-        own = work.contacts.vert.numpy()[:n, :2]  # the others are those of the other side
-        return own[work.contacts.coef.numpy()[:n, :2] != 0.0]
 
-    def _begin(self, x: wp.array) -> None:
-        """Remember the first state."""
-        surf = np.repeat(self.model.surf.numpy()[:, None], 2, axis=1)
-        ends = np.concatenate([surf, self.model.edges.numpy()[:, :2]])
-        self._ends = wp.array(ends, dtype=wp.vec2i)
-        self._entered = wp.full(len(ends), -1, dtype=int)
-        self._deep = wp.zeros(len(ends), dtype=int)
-        self._last = x
+def _contacts(work: Work) -> np.ndarray:
+    """Contacts of the last step, as they are in ``contacts.record``."""
+    return work.contacts.record.numpy()[: int(work.contacts.n.numpy()[0])]
 
-    def follow(self, x: wp.array) -> None:
-        """Count the points that went through something since the last call."""
-        model = self.model
-        if self._last is None:
-            self._begin(wp.clone(x))
-            return
-        bodies, surface, _ = self._refit(self._last, x)
-        passed = wp.zeros(len(self._ends), dtype=int)
-        wp.launch(
-            tunnelling.follow_points,
-            dim=len(self._ends),
-            inputs=[bodies.id, surface.id, model.tris, model.tri_body, self._ends]
-            + [model.vert_body, model.body_world, model.body_thickness]
-            + [model.plane_n, model.plane_h, self._last, x],
-            outputs=[self._entered, self._deep, passed],
-        )
-        wp.copy(self._last, x)
-        body = passed.numpy()
-        through = np.flatnonzero(body >= 0)
-        self._tunnelled += len(through)
-        if len(through):
-            own = model.vert_body.numpy()[self._ends.numpy()[through[-1], 0]]
-            self._tunnelled_pair = self.names[own], self.names[body[through[-1]]]
 
-    def jump(self, x: wp.array, first: int, last: int) -> None:
-        """Go on from positions ``x`` that no motion led to, of the bodies ``first`` to ``last``."""
-        own = self.model.vert_body.numpy()[self._ends.numpy()[:, 0]]
-        entered, deep = self._entered.numpy(), self._deep.numpy()
-        into = np.where(entered < 0, -1, self.model.tri_body.numpy()[entered])
-        anew = (first <= own) & (own <= last) | (first <= into) & (into <= last)
-        self._entered.assign(np.where(anew, np.int32(-1), entered))
-        self._deep.assign(np.where(anew, np.int32(0), deep))
-        wp.copy(self._last, x)
-
-    def _refit(self, x0: wp.array, x: wp.array) -> tuple[wp.Bvh, wp.Bvh, wp.Bvh]:
-        """Trees over the ways of bodies and triangles from x0 to x, and over the tets at x."""
-        model = self.model
-        if self._bvhs is None:
-            sizes = model.n_body, model.n_tri, model.n_tet
-            self._boxes = [(wp.zeros(n, dtype=wp.vec3), wp.zeros(n, dtype=wp.vec3)) for n in sizes]
-            self._skin = wp.zeros(model.n_body, dtype=float)
-        of_body, of_tri, of_tet = (list(box) for box in self._boxes)
-        wp.launch(bounds.clear_boxes, dim=model.n_body, inputs=[], outputs=of_body)
-        for place in (x0, x):
-            wp.launch(
-                bounds.body_boxes,
-                dim=-(-model.n_surf // int(bounds.CHUNK)),
-                inputs=[model.surf, model.vert_body, self._skin, place],
-                outputs=of_body,
-            )
-        ways = [model.tris, model.tri_body, model.body_edge, x0, x]
-        wp.launch(tunnelling.triangle_paths, dim=model.n_tri, inputs=ways, outputs=of_tri)
-        wp.launch(kernels.tet_boxes, dim=model.n_tet, inputs=[model.tets, x], outputs=of_tet)
-        if self._bvhs is None:
-            vert_body = model.vert_body.numpy()
-            world = model.body_world.numpy()[vert_body[self._tets[:, 0]]]
-            groups = model.body_world, model.tri_body, wp.array(world, dtype=int)
-            self._bvhs = tuple(
-                wp.Bvh(*box, groups=group) for box, group in zip(self._boxes, groups, strict=True)
-            )
-        for bvh in self._bvhs:
-            bvh.refit()
-        return self._bvhs
-
-    @staticmethod
-    def _n(work: Work) -> int:
-        return int(work.contacts.n.numpy()[0])
+def _held(work: Work) -> np.ndarray:
+    """Vertices that a contact of the last step moved out of another body or plane."""
+    contacts = _contacts(work)
+    own = contacts["vert"][:, :2]  # the others are those of the other side
+    return own[contacts["coef"][:, :2] != 0.0]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warp_contact.kernels.narrow_phase.gap import REST
+from warp_contact.kernels.narrow_phase.contact import REST
 
 ROUNDING = 2.0**-24  # of a float32, at most
 DROWNED = 10.0  # gaps at rest, by which rounding may move a body: soft ones take it

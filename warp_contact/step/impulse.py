@@ -1,175 +1,134 @@
-"""Stage 5: impulses between the bodies; penalty and predicted forces, to compare with."""
+"""Impulses between the bodies until no contact approaches."""
+
+from functools import partial
 
 import warp as wp
 
-from warp_contact.data.launch import launch_over
+from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.state import State
 from warp_contact.data.work import Work
-from warp_contact.kernels.impulse import (
-    impulse,
-    pair_impulses,
-    penalty,
-    persistent,
-    predicted,
-    warm_start,
-)
-from warp_contact.step.response import Penalty
+from warp_contact.kernels.impulse import constraint, pair_impulses
+from warp_contact.kernels.impulse import impulse as kernels
+from warp_contact.step import residual, sweeps, warm_start
+from warp_contact.step.contact_graph import order_by_vertex
+from warp_contact.step.narrow_phase import append_edge_contacts
 
-SWEEPS = 48  # of the impulses, at most; few clusters of contacts last so long
+SWEEPS = 48  # at most; few clusters of contacts last so long
 TOLERANCE = 1e-5  # of an edge: an approach in one step that is left to the closure
-QUIET = 0.1  # of the tolerance, at the shortest edge: a change that nobody needs to know of
+NEGLIGIBLE = 0.1  # of the tolerance, at the shortest edge: a change that changes no other contact
 
 
-def begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
-    """Set what the sweeps need; contacts from ``first``, shape (1,), on have no impulse yet."""
-    c = work.contacts
-    launch_over(
-        impulse.begin_contacts,
-        work.capacity.contacts,
-        inputs=[model.friction, first, c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.start]
-        + [model.inv_mass, model.body_edge, work.dt, x0],
-        outputs=[c.weight, c.coupled, c.closing, c.open, c.turn, c.mu, c.ramp]
-        + [c.lam, c.slip, c.ahead],
-    )
+def solve(model: Model, state: State, work: Work) -> None:
+    """Change ``state.v`` by impulses at the contacts found, from those of the last step on."""
+    none = partial(warm_start.forget_edges, work)
+    if_any(work.contacts.n, _solve_from_last, model, state, work, otherwise=none)
 
 
-def recall(model: Model, v: wp.array, work: Work) -> None:
-    """Start the contacts, and ``v``, from the impulses of the last step."""
-    c = work.contacts
-    recall_edges(work)
-    launch_over(
-        warm_start.recall,
-        work.capacity.contacts,
-        inputs=[work.n_hit, c.n, c.vert, c.coef, c.normal, c.pair, c.weight]
-        + [c.open, c.turn, c.mu, c.ramp, work.warm.partner, work.warm.kept],
-        outputs=[c.lam, c.slip, c.ahead, c.part],
-    )
-    _apply(model, v, work)
+def add_edges(model: Model, state: State, work: Work) -> None:
+    """Add the contacts of edges that were found since; those at hand keep their impulses."""
+    if_any(work.narrow_phase.n_new, _add_edges, model, state, work)
 
 
-def recall_edges(work: Work) -> None:
-    """Let the contacts of edges go on from the impulses that they have."""
-    c = work.contacts
-    launch_over(
-        persistent.recall,
-        work.capacity.contacts,
-        inputs=[work.n_hit, c.n, c.normal, c.weight, c.mu, work.source, work.crossing],
-        outputs=[c.lam, c.slip, c.ahead],
-    )
+def solve_again(model: Model, state: State, work: Work) -> None:
+    """Exchange impulses once more where bodies still overlap at the positions ``work.x``."""
+    residual.find_gaps(model, work.x, work)
+    if_any(work.surface.any_open, exchange, model, state.v, work)
 
 
-def keep(work: Work) -> None:
-    """Keep the impulses of the vertices for the next step."""
-    c = work.contacts
-    work.warm.partner.fill_(-1)
-    launch_over(
-        warm_start.keep,
-        work.capacity.contacts,
-        inputs=[work.n_hit, c.vert, c.pair, c.lam, c.slip],
-        outputs=[work.warm.partner, work.warm.kept],
-    )
-
-
-def keep_edges(work: Work) -> None:
-    """Keep the impulses of the edges, and their contacts for the next step."""
-    c = work.contacts
-    launch_over(
-        persistent.keep,
-        work.capacity.contacts,
-        inputs=[work.n_hit, c.n, work.source, c.lam, c.slip],
-        outputs=[work.crossing, work.warm.held, work.warm.n_held],
-    )
+def finish(work: Work) -> None:
+    """Keep the impulses for the next step, and add them to the forces of the frame."""
+    warm_start.keep_vertices(work)
+    record(work)
 
 
 def forget(work: Work) -> None:
-    """There are no contacts in this step, and no impulses to start the next one from."""
-    work.n_hit.zero_()
-    work.n_crossing.zero_()
+    """There are no contacts in this step."""
+    work.contacts.n_vertex.zero_()
+    work.narrow_phase.n_crossing.zero_()
     work.contacts.n.zero_()
-    work.warm.partner.fill_(-1)
-    forget_edges(work)
+    warm_start.forget(work)
 
 
-def forget_edges(work: Work) -> None:
-    """There are no contacts of edges for the next step to go on with."""
-    work.warm.n_held.zero_()
+def begin(model: Model, x0: wp.array, work: Work) -> None:
+    """Order the contacts by vertex, and set what holds them; none has an impulse yet."""
+    _begin(model, x0, work, work.narrow_phase.none)
 
 
 def exchange(model: Model, v: wp.array, work: Work) -> None:
     """Change ``v`` by normal impulses and friction until no contact approaches."""
-    c = work.contacts
-
-    def sweep(first: bool = False, last: bool = False) -> None:
-        next_sweep(work, first)
-        launch_over(
-            impulse.solve_contacts,
-            work.capacity.contacts,
-            inputs=[TOLERANCE, _little(work), SWEEPS, work.dt, model.body_edge, c.pair, work.done]
-            + [c.n, c.vert, c.coef, c.normal, c.coupled, c.closing, c.open, c.turn]
-            + [c.mu, c.ramp, work.stirred, v, last],
-            outputs=[c.lam, c.slip, c.ahead, c.busy, c.part, work.served, work.again],
-        )
-        _apply(model, v, work, swept=True)
-
-    sweep(first=True)
-    wp.capture_while(work.again, sweep)
-    sweep(last=True)
+    sweeps.repeat(work, _sweep, model, v, work)
+    sweeps.count(work)
+    _sweep(model, v, work, last=True)
+    warm_start.keep_edges(work)
 
 
-def next_sweep(work: Work, first: bool) -> None:
-    """Count a sweep over the contacts in ``done`` and clear ``again``."""
-    wp.launch(impulse.next_sweep, dim=1, inputs=[first], outputs=[work.again, work.done])
-
-
-def push(model: Model, v: wp.array, work: Work, response: Penalty) -> None:
-    """Change ``v`` by the penalty forces at the depths found."""
+def apply(model: Model, v: wp.array, work: Work) -> None:
+    """Add the parts of the contacts to ``v``."""
     c = work.contacts
     launch_over(
-        penalty.penalty_impulses,
-        work.capacity.contacts,
-        inputs=[response.stiffness, response.damping, model.friction, work.dt]
-        + [c.n, c.vert, c.coef, c.normal, c.depth, c.coupled, c.open, c.turn, v],
-        outputs=[c.lam, c.slip, c.part],
+        kernels.apply_impulses,
+        model.n_vert,
+        inputs=[c.graph, c.part, work.mobility],
+        outputs=[v, work.forces.received],
     )
-    _apply(model, v, work)
 
 
-def push_apart(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
-    """Change ``v`` by the forces that close the gaps at the predicted positions ``x``."""
-    c = work.contacts
-    launch_over(
-        predicted.predicted_impulses,
-        work.capacity.contacts,
-        inputs=[model.n_body, model.friction, work.dt]
-        + [c.n, c.vert, c.coef, c.normal, c.offset, c.pair, c.weight, c.coupled]
-        + [c.open, c.turn, x, v],
-        outputs=[c.lam, c.slip, c.part],
-    )
-    _apply(model, v, work)
-
-
-def record(work: Work, unit: float) -> None:
-    """Add the impulses of all contacts to their pairs of bodies, in counts of ``unit`` [N s]."""
-    c = work.contacts
+def record(work: Work) -> None:
+    """Add the impulses of all contacts to their pairs of bodies."""
+    c, forces = work.contacts, work.forces
     launch_over(
         pair_impulses.add_pair_impulses,
         work.capacity.contacts,
-        inputs=[unit, c.n, c.pair, c.normal, c.lam, c.slip],
-        outputs=[work.pair_key, work.pair_total, c.needed[1:2]],
+        inputs=[forces.unit, c.n, c.record, c.impulse],
+        outputs=[forces.pair_key, forces.pair_total, work.overflow.pairs],
     )
 
 
-def _apply(model: Model, v: wp.array, work: Work, swept: bool = False) -> None:
-    """Add the parts of the contacts to ``v``; ``swept``: only what the last sweep changed."""
+def _solve_from_last(model: Model, state: State, work: Work) -> None:
+    begin(model, state.x, work)
+    warm_start.recall_edges(work)
+    warm_start.recall_vertices(work)
+    apply(model, state.v, work)
+    exchange(model, state.v, work)
+
+
+def _add_edges(model: Model, state: State, work: Work) -> None:
+    append_edge_contacts(model, state.x, work)
+    _begin(model, state.x, work, work.contacts.n_vertex)
+    warm_start.recall_edges(work)
+
+
+def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
+    """Contacts from number ``first``, shape (1,), on have no impulse yet; others keep theirs."""
     c = work.contacts
+    order_by_vertex(model, work)
     launch_over(
-        impulse.apply_impulses,
-        model.n_vert,
-        inputs=[swept, _little(work), work.dt, work.done]
-        + [c.n_touched, c.touched, c.start, c.entry, c.part, model.inv_mass, work.served],
-        outputs=[v, work.impulse, work.stirred],
+        constraint.begin_contacts,
+        work.capacity.contacts,
+        inputs=[model.friction, first, c.n, c.record, c.graph, work.mobility, work.dt, x0],
+        outputs=[c.constraint, c.impulse],
     )
 
 
-def _little(work: Work) -> float:
-    return QUIET * TOLERANCE * work.candidates.edge
+def _sweep(model: Model, v: wp.array, work: Work, last: bool = False) -> None:
+    c, s, limits = work.contacts, work.sweeps, _limits(work)
+    launch_over(
+        kernels.solve_contacts,
+        work.capacity.contacts,
+        inputs=[limits, last, s.number, work.dt, c.n, c.record, c.constraint, s.changed, v],
+        outputs=[c.impulse, s.busy, c.part, s.served, s.again],
+    )
+    launch_over(
+        kernels.apply_sweep,
+        model.n_vert,
+        inputs=[limits.negligible, s.number, work.dt, c.graph, c.part, work.mobility, s.served],
+        outputs=[v, work.forces.received, s.changed],
+    )
+
+
+def _limits(work: Work) -> kernels.Limits:
+    limits = kernels.Limits()
+    limits.tolerance, limits.sweeps = TOLERANCE, SWEEPS
+    limits.negligible = NEGLIGIBLE * TOLERANCE * work.mesh.edge
+    return limits

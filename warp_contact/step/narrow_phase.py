@@ -1,66 +1,139 @@
-"""Stage 1, in every step: vertices inside other bodies, surface edges across other bodies."""
+"""Which vertices lie inside other bodies, which edges cross them: the contacts of a step.
+
+A contact is looked for in one of two ways. Where bodies did not overlap when the step began (they
+were apart), whatever overlaps has come in within the step, and the side by which it came tells the
+direction. Where they may have overlapped before, the depth alone does.
+"""
+
+from functools import partial
 
 import warp as wp
 
-from warp_contact.data.launch import launch_over
+from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.work import Work
-from warp_contact.kernels.impulse import persistent
-from warp_contact.kernels.narrow_phase import edges, vertices
-from warp_contact.step import broad_phase
+from warp_contact.kernels.narrow_phase import edges, persistent, vertex_contact, vertices
+from warp_contact.step.broad_phase import track
+from warp_contact.step.contact_graph import count_contacts
+from warp_contact.step.depth import find_depths
 
 
-def find_hits(model: Model, x: wp.array, work: Work) -> None:
-    """Set the hits at ``x``, sorted by vertex and body, ``hit_at``, ``layer`` and ``pending``."""
-    broad_phase.track(model, x, work)
-    c = work.candidates.verts
+def find_entered_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Contacts of the vertices inside other bodies at ``x``; they were apart at ``x0``."""
+    _find_vertices(model, x0, x, work, apart=True)
+
+
+def find_inner_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Contacts of the vertices inside other bodies at ``x``; they may have been so at ``x0``."""
+    _find_vertices(model, x0, x, work, apart=False)
+
+
+def find_entered_edges(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Contacts of the edges across other bodies at ``x``, beside those that have a place."""
+    _find_edges(model, x0, x, work, apart=True)
+
+
+def find_inner_edges(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """The same where bodies may have overlapped at ``x0``."""
+    _find_edges(model, x0, x, work, apart=False)
+
+
+def forget_edges(work: Work) -> None:
+    """No contact of an edge has a place."""
+    work.narrow_phase.place.fill_(-1)
+    work.narrow_phase.n_place.zero_()
+
+
+def continue_edges(model: Model, x0: wp.array, work: Work) -> None:
+    """Let the contacts of edges go on that pressed in the last step; this one begins at ``x0``."""
+    none = partial(forget_edges, work)
+    if_any(work.warm.n_edge, _continue_edges, model, x0, work, otherwise=none)
+
+
+def append_edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
+    """Set the contacts of the edges that have a place, behind those of the vertices."""
+    n, c = work.narrow_phase, work.contacts
     launch_over(
-        vertices.find_hits,
-        work.capacity.verts,
-        inputs=[c.n, c.pair, c.items, c.item, model.n_body, model.tets]
-        + [model.vert_body, model.body_edge, model.plane_n, model.plane_h, work.candidates.way, x],
-        outputs=[c.wake, work.hit_at],
-    )
-    wp.utils.array_scan(work.hit_at, work.hit_at, inclusive=False)
-    launch_over(
-        vertices.list_hits,
-        work.capacity.verts,
-        inputs=[model.n_body, c.n, c.pair, work.hit_at],
-        outputs=[work.hit_vert, work.hit_body, work.hit_layer, work.layer, work.pending],
-    )
-
-
-def find_crossings(
-    model: Model, x0: wp.array, x: wp.array, work: Work, fresh: bool, hold: bool = False
-) -> None:
-    """Set ``crossing_at``, ``place``, ``crossing`` and ``n_new``: edges across a body at ``x``.
-
-    The step begins at ``x0``; ``fresh``: no overlap is older than that. ``hold``: add to what is
-    there.
-    """
-    broad_phase.track(model, x, work, hold)
-    c = work.candidates.edges
-    launch_over(
-        edges.find_crossings,
+        edges.edge_contacts,
         work.capacity.edges,
-        inputs=[hold, fresh, work.candidates.skin, c.n, c.pair, c.items, c.item, work.surface.id]
-        + [model.tris, model.edges, model.vert_body, model.body_edge]
-        + [work.candidates.pace, work.candidates.way, x0, x],
-        outputs=[c.wake, work.place, work.crossing, work.crossing_at] + [work.n_place, work.n_new],
+        inputs=[work.mesh, work.broad_phase.edges.list, c.n_vertex, n.crossing_at]
+        + [n.place, n.found, x0],
+        outputs=[c.record, n.source],
     )
-    wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)
+    count_contacts(work, n.n_crossing, n.n_place)
 
 
-def hold_crossings(model: Model, x0: wp.array, work: Work) -> None:
-    """Set ``crossing_at``, ``place`` and ``crossing``: contacts of edges that go on."""
-    c = work.candidates.edges
-    work.place.fill_(-1)
-    work.crossing_at.zero_()
+def _find_vertices(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool) -> None:
+    def find() -> None:
+        _find_penetrations(model, x, work)
+        if_any(work.contacts.n_vertex, make_contacts, otherwise=work.contacts.n.zero_)
+
+    def make_contacts() -> None:
+        find_depths(model, x, work)
+        launch_over(
+            vertex_contact.vertex_contacts,
+            work.capacity.contacts,
+            inputs=[apart, work.mesh, x0, x, work.contacts.n_vertex, n.penetration],
+            outputs=[work.contacts.record],
+        )
+        count_contacts(work, n.none, n.none)
+
+    def find_none() -> None:
+        work.contacts.n_vertex.zero_()
+        work.contacts.n.zero_()
+
+    n = work.narrow_phase
+    if_any(work.broad_phase.verts.n, find, otherwise=find_none)
+
+
+def _find_penetrations(model: Model, x: wp.array, work: Work) -> None:
+    """Set the vertices inside other bodies at ``x``, sorted by vertex and body."""
+    track(model, x, work)
+    b, n = work.broad_phase, work.narrow_phase
     launch_over(
-        persistent.hold,
-        work.capacity.contacts,
-        inputs=[work.candidates.edge, work.warm.n_held, work.warm.held, c.start, c.pair]
-        + [model.edges, model.tris, x0],
-        outputs=[work.crossing_at, work.place, work.crossing, work.n_place],
+        vertices.find_penetrations,
+        work.capacity.verts,
+        inputs=[work.mesh, b.verts.list, b.travelled, x],
+        outputs=[b.verts.clear_until, n.inside_at],
     )
-    wp.utils.array_scan(work.crossing_at, work.crossing_at, inclusive=False)
+    wp.utils.array_scan(n.inside_at, n.inside_at, inclusive=False)
+    launch_over(
+        vertices.list_penetrations,
+        work.capacity.verts,
+        inputs=[model.n_body, b.verts.list, n.inside_at],
+        outputs=[n.penetration, n.layer, n.pending],
+    )
+
+
+def _find_edges(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool) -> None:
+    def find() -> None:
+        track(model, x, work)
+        b = work.broad_phase
+        launch_over(
+            edges.find_crossings,
+            work.capacity.edges,
+            inputs=[apart, work.mesh, b.edges.list, b.skin, b.recent, b.travelled, x0, x],
+            outputs=[b.edges.clear_until, n.place, n.found, n.crossing_at, n.n_place, n.n_new],
+        )
+        wp.utils.array_scan(n.crossing_at, n.crossing_at, inclusive=False)
+
+    def find_none() -> None:
+        n.n_crossing.zero_()
+        n.n_new.zero_()
+
+    n = work.narrow_phase
+    if_any(work.broad_phase.edges.n, find, otherwise=find_none)
+
+
+def _continue_edges(model: Model, x0: wp.array, work: Work) -> None:
+    n = work.narrow_phase
+    n.place.fill_(-1)
+    n.crossing_at.zero_()
+    launch_over(
+        persistent.continue_contacts,
+        work.capacity.contacts,
+        inputs=[work.warm.n_edge, work.warm.edges, work.broad_phase.edges.list, work.mesh, x0],
+        outputs=[n.crossing_at, n.place, n.found, n.n_place],
+    )
+    wp.utils.array_scan(n.crossing_at, n.crossing_at, inclusive=False)
+    if_any(n.n_crossing, append_edge_contacts, model, x0, work)

@@ -182,22 +182,17 @@ def choose_skins(
 
 @wp.kernel
 def go_on(
-    # in
-    hold: bool,  # contacts of edges have places already, to which a look adds
     # in, out
     motion: wp.array[float],  # (n_body,) [m] 0 on return
     pace: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
     way: wp.array[float],  # (n_body + n_plane,) [m]
     # out
-    n_place: wp.array[int],  # (1,) 0: a look at the edges begins to count
-    n_new: wp.array[int],  # (1,) 0
+    n_new: wp.array[int],  # (1,) 0: a look at the edges begins to count
 ):
     """One thread per body."""
     m = wp.tid()
     if m == 0:
         n_new[0] = 0
-        if not hold:
-            n_place[0] = 0
     way[m] = way[m] + motion[m]
     pace[m] = wp.max(motion[m], FADING * pace[m])
     motion[m] = 0.0

@@ -1,0 +1,25 @@
+"""How a vertex answers an impulse: the one place that the contact solver asks.
+
+    dv_i = G_i p,   G_i = 1 / m_i, 0 for a vertex that is fixed       mobility   [1/kg]
+
+Every body is lumped: an impulse on a vertex moves no other vertex within the step.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
+
+
+@wp.struct
+class Mobility:
+    """Of all vertices."""
+
+    inv_mass: wp.array[float]  # (n_vert,) [1/kg]
+
+
+@wp.func
+def mobility_of(i: int, bodies: Mobility) -> float:
+    """G of vertex i [1/kg]."""
+    return bodies.inv_mass[i]

@@ -1,0 +1,83 @@
+"""What the impulses leave: overlaps, and vertices that left their triangle or lie below it.
+
+The gap of a vertex is that to a point of its triangle, along a direction that may not be its
+normal: once the vertex has slid, it may overlap this or another triangle all the same.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.geometry import projected_weights
+from warp_contact.kernels.impulse.constraint import Constraint
+from warp_contact.kernels.narrow_phase.contact import Contact, gap
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
+
+TOLERANCE = wp.constant(1.0e-4)  # of an edge: less overlap is left to the resting gap
+DEEP = wp.constant(
+    1.0e-3
+)  # of an edge below the resting gap, at the start of a step: worth a search
+STRAY = wp.constant(1.0e-3)  # barycentric weight below which a vertex has left its triangle
+
+# Places in ``found``.
+OPEN = wp.constant(0)  # some overlap is to be closed
+OLD = wp.constant(1)  # some overlap is to be searched: no step created it
+WAS_OLD = wp.constant(2)  # there was one since the frame began
+
+
+@wp.kernel
+def residual_gaps(
+    # in
+    threads: int,
+    n_contact: wp.array[int],  # (1,)
+    contact: wp.array[Contact],  # (capacity,)
+    constraint: wp.array[Constraint],  # (capacity,)
+    dt: wp.array[float],  # (1,) [s]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    residual: wp.array[float],  # (capacity,) [m], 0 up to the tolerance
+    # out, added to
+    found: wp.array[int],  # (3,) 1 for each that is so
+):
+    """For each contact: its overlap at x."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        residual[c] = 0.0
+        at = contact[c]
+        if wp.length_sq(at.normal) == 0.0:
+            continue
+        d = -gap(at, x)
+        edge = at.edge
+        if d > TOLERANCE * edge:
+            residual[c] = d
+            found[OPEN] = 1
+        if d > DEEP * edge and -constraint[c].gap_bound * dt[0] > DEEP * edge:
+            found[OLD] = 1
+            found[WAS_OLD] = 1
+
+
+@wp.kernel
+def find_strays(
+    # in
+    threads: int,
+    n_contact: wp.array[int],  # (1,)
+    contact: wp.array[Contact],  # (capacity,)
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out, added to
+    found: wp.array[int],  # (3,) 1 for an overlap
+):
+    """For each contact of a vertex with a triangle: whether the vertex left it, or lies below."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        at = contact[c]
+        if at.coef[0] != 1.0 or at.on_plane:
+            continue
+        if wp.length_sq(at.normal) == 0.0:
+            continue
+        p = x[at.vert[0]]
+        t0 = x[at.vert[2]]
+        t1 = x[at.vert[3]]
+        t2 = x[at.vert[4]]
+        face = wp.normalize(wp.cross(t1 - t0, t2 - t0))
+        w = projected_weights(p, at.normal, t0, t1, t2)
+        below = wp.dot(p - t0, face) < -TOLERANCE * at.edge
+        if wp.min(w) < -STRAY or below:
+            found[OPEN] = 1

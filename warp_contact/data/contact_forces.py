@@ -1,0 +1,32 @@
+"""The impulses of a frame so far: by vertex, and by pair of bodies."""
+
+from dataclasses import dataclass
+
+import warp as wp
+
+
+@dataclass
+class ContactForces:
+    """Added up from the first step of the frame on.
+
+    Attributes:
+        unit: momentum of one count in ``pair_total`` [N s]
+        received: impulse received by each vertex [N s], shape (n_vert,)
+        pair_key: the two bodies of a pair with a contact force, -1 where free, shape (pairs,)
+        pair_total: its impulse, in units, shape (pairs, 3)
+    """
+
+    unit: float
+    received: wp.array[wp.vec3]
+    pair_key: wp.array[wp.int64]
+    pair_total: wp.array2d[wp.int64]
+
+
+def allocate(n_vert: int, n_pair: int, unit: float) -> ContactForces:
+    """There was no impulse yet."""
+    return ContactForces(
+        unit=unit,
+        received=wp.zeros(n_vert, dtype=wp.vec3),
+        pair_key=wp.full(n_pair, -1, dtype=wp.int64),
+        pair_total=wp.zeros((n_pair, 3), dtype=wp.int64),
+    )

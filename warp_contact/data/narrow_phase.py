@@ -1,0 +1,65 @@
+"""What the narrow phase finds on its way to the contacts of a step."""
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from warp_contact.data.overflow import Capacity
+from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact
+from warp_contact.kernels.narrow_phase.vertices import Penetration
+
+
+@dataclass
+class NarrowPhase:
+    """Vertices inside bodies, and the contacts of edges by the place at which they are kept.
+
+    Attributes:
+        inside_at: penetrations before each pair of a vertex and a body, shape (pairs + 1,)
+        n_inside: their number: the last entry, shape (1,)
+        penetration: vertices inside bodies, shape (contacts,)
+        layer: layer of the propagation of depths, shape (1,)
+        pending: whether it goes on, shape (1,)
+        crossing_at: contacts before each pair of an edge and a body, shape (pairs + 1,)
+        n_crossing: their number: the last entry, shape (1,)
+        found: contacts of edges in any order, shape (contacts,)
+        n_place: places taken in ``found``, some of them no longer in use, shape (1,)
+        place: that of the first contact of each pair, -1 for none, shape (pairs,)
+        source: place of each contact of an edge, shape (contacts,)
+        n_new: contacts of edges that the last look has added, shape (1,)
+        none: zero, shape (1,)
+    """
+
+    inside_at: wp.array[int]
+    n_inside: wp.array[int]
+    penetration: wp.array[Penetration]
+    layer: wp.array[int]
+    pending: wp.array[int]
+    crossing_at: wp.array[int]
+    n_crossing: wp.array[int]
+    found: wp.array[EdgeContact]
+    n_place: wp.array[int]
+    place: wp.array[int]
+    source: wp.array[int]
+    n_new: wp.array[int]
+    none: wp.array[int]
+
+
+def allocate(capacity: Capacity) -> NarrowPhase:
+    """Nothing was found yet."""
+    inside_at = wp.zeros(capacity.verts + 1, dtype=int)
+    crossing_at = wp.zeros(capacity.edges + 1, dtype=int)
+    return NarrowPhase(
+        inside_at=inside_at,
+        n_inside=inside_at[capacity.verts :],
+        penetration=wp.zeros(capacity.contacts, dtype=Penetration),
+        layer=wp.zeros(1, dtype=int),
+        pending=wp.zeros(1, dtype=int),
+        crossing_at=crossing_at,
+        n_crossing=crossing_at[capacity.edges :],
+        found=wp.zeros(capacity.contacts, dtype=EdgeContact),
+        n_place=wp.zeros(1, dtype=int),
+        place=wp.zeros(capacity.edges, dtype=int),
+        source=wp.zeros(capacity.contacts, dtype=int),
+        n_new=wp.zeros(1, dtype=int),
+        none=wp.zeros(1, dtype=int),
+    )

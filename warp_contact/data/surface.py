@@ -1,0 +1,73 @@
+"""Scratch of the search for the contact surface and of the closure."""
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from warp_contact.kernels.surface.residual import OLD, OPEN, WAS_OLD
+
+
+@dataclass
+class Surface:
+    """What the impulses left of overlaps, and the way to the common surface.
+
+    Attributes:
+        found: the three below, shape (3,)
+        of_step: the first two of them, which are those of a step, shape (2,)
+        any_open: whether some overlap is to be closed, shape (1,)
+        any_old: whether some is to be searched, as no step created it, shape (1,)
+        was_old: whether there was any to be searched since the frame began, shape (1,)
+        residual: overlap after the impulses, 0 up to a tolerance [m], shape (contacts,)
+        slack: part of it that later steps close [m], shape (contacts,)
+        push: of the closure [kg m], shape (contacts,)
+        mask: tets that touch the region, shape (n_tet,)
+        s: displacement vectors of eq. (1) [m], shape (n_vert,)
+        area: areas of comparison [m^2], shape (n_vert,)
+        at_start, at_trial: tractions before the search and at a trial [Pa], shape (n_vert,)
+        stiffness: traction gained over the whole of s [Pa], shape (n_vert,)
+        fraction: part of s, shape (n_vert,)
+        upper_mean, lower_mean: of traction, stiffness, fraction at both sides of each contact,
+            shape (contacts,)
+    """
+
+    found: wp.array[int]
+    of_step: wp.array[int]
+    any_open: wp.array[int]
+    any_old: wp.array[int]
+    was_old: wp.array[int]
+    residual: wp.array[float]
+    slack: wp.array[float]
+    push: wp.array[float]
+    mask: wp.array[int]
+    s: wp.array[wp.vec3]
+    area: wp.array[float]
+    at_start: wp.array[float]
+    at_trial: wp.array[float]
+    stiffness: wp.array[float]
+    fraction: wp.array[float]
+    upper_mean: wp.array[wp.vec3]
+    lower_mean: wp.array[wp.vec3]
+
+
+def allocate(n_vert: int, n_tet: int, n_contact: int) -> Surface:
+    """Nothing was found yet."""
+    found = wp.zeros(3, dtype=int)
+    return Surface(
+        found=found,
+        of_step=found[:2],
+        any_open=found[int(OPEN) : int(OPEN) + 1],
+        any_old=found[int(OLD) : int(OLD) + 1],
+        was_old=found[int(WAS_OLD) : int(WAS_OLD) + 1],
+        residual=wp.zeros(n_contact, dtype=float),
+        slack=wp.zeros(n_contact, dtype=float),
+        push=wp.zeros(n_contact, dtype=float),
+        mask=wp.zeros(n_tet, dtype=int),
+        s=wp.zeros(n_vert, dtype=wp.vec3),
+        area=wp.zeros(n_vert, dtype=float),
+        at_start=wp.zeros(n_vert, dtype=float),
+        at_trial=wp.zeros(n_vert, dtype=float),
+        stiffness=wp.zeros(n_vert, dtype=float),
+        fraction=wp.zeros(n_vert, dtype=float),
+        upper_mean=wp.zeros(n_contact, dtype=wp.vec3),
+        lower_mean=wp.zeros(n_contact, dtype=wp.vec3),
+    )

@@ -1,0 +1,35 @@
+"""A whole look for contacts at some positions, without any from the step before."""
+
+import warp as wp
+
+from warp_contact.data.launch import if_any
+from warp_contact.data.model import Model
+from warp_contact.data.work import Work
+from warp_contact.step import impulse, narrow_phase
+
+
+def look(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Contacts of vertices and edges at ``x``, in a step from ``x0``, and what holds them."""
+    narrow_phase.find_inner_vertices(model, x0, x, work)
+    narrow_phase.forget_edges(work)
+    narrow_phase.find_inner_edges(model, x0, x, work)
+    _hold(model, x0, work)
+
+
+def look_apart(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """The same where bodies were apart when the step began."""
+    narrow_phase.find_entered_vertices(model, x0, x, work)
+    narrow_phase.forget_edges(work)
+    narrow_phase.find_entered_edges(model, x0, x, work)
+    _hold(model, x0, work)
+
+
+def look_at_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Contacts of vertices alone, as in the paper."""
+    narrow_phase.find_inner_vertices(model, x0, x, work)
+    if_any(work.contacts.n, impulse.begin, model, x0, work)
+
+
+def _hold(model: Model, x0: wp.array, work: Work) -> None:
+    if_any(work.narrow_phase.n_crossing, narrow_phase.append_edge_contacts, model, x0, work)
+    if_any(work.contacts.n, impulse.begin, model, x0, work)

@@ -1,0 +1,70 @@
+"""One step of the responses that the default is compared with."""
+
+import warp as wp
+
+from warp_contact.data.launch import if_any, launch_over
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.data.work import Work
+from warp_contact.kernels.impulse import penalty, predicted
+from warp_contact.step import broad_phase, impulse, residual, search
+from warp_contact.step.look import look, look_at_vertices
+from warp_contact.step.motion import drift, predict
+from warp_contact.step.response import Penalty
+
+
+def step_literal(model: Model, state: State, work: Work, stages: int, iterations: int) -> None:
+    """The paper as printed: displacement first, then velocities."""
+    predict(model, state, work, stages)
+    broad_phase.refresh(model, state.x, work.x, work)
+    wp.copy(state.x, work.x)
+    look_at_vertices(model, state.x, state.x, work)
+    residual.find_gaps(model, state.x, work)
+    if_any(work.surface.any_open, search.bisect, model, state.x, work, iterations)
+    if_any(work.contacts.n, impulse.exchange, model, state.v, work)
+    impulse.record(work)
+
+
+def step_penalty(model: Model, state: State, work: Work, stages: int, response: Penalty) -> None:
+    """Penalty forces: they belong to the positions at which they act."""
+    broad_phase.refresh(model, state.x, state.x, work)
+    look(model, state.x, state.x, work)
+    predict(model, state, work, stages)
+    if_any(work.contacts.n, _push, model, state, work, response)
+    impulse.record(work)
+    drift(model, state, work, state.x)
+
+
+def step_predicted(model: Model, state: State, work: Work, stages: int) -> None:
+    """Forces that close the gaps predicted for the end of the step; overlaps may last."""
+    predict(model, state, work, stages)
+    broad_phase.refresh(model, state.x, work.x, work)
+    look(model, state.x, work.x, work)
+    if_any(work.contacts.n, _push_apart, model, state, work)
+    impulse.record(work)
+    drift(model, state, work, state.x)
+
+
+def _push(model: Model, state: State, work: Work, response: Penalty) -> None:
+    """Change ``state.v`` by the penalty forces at the depths found."""
+    c = work.contacts
+    launch_over(
+        penalty.penalty_impulses,
+        work.capacity.contacts,
+        inputs=[response.stiffness, response.damping, model.friction, work.dt]
+        + [c.n, c.record, c.constraint, state.v],
+        outputs=[c.impulse, c.part],
+    )
+    impulse.apply(model, state.v, work)
+
+
+def _push_apart(model: Model, state: State, work: Work) -> None:
+    """Change ``state.v`` by the forces that close the gaps at ``work.x``."""
+    c = work.contacts
+    launch_over(
+        predicted.predicted_impulses,
+        work.capacity.contacts,
+        inputs=[model.friction, work.dt, c.n, c.record, c.constraint, work.x, state.v],
+        outputs=[c.impulse, c.part],
+    )
+    impulse.apply(model, state.v, work)

@@ -1,0 +1,36 @@
+"""What the impulses leave of overlaps: the work of the closure and of the search."""
+
+import warp as wp
+
+from warp_contact.data.launch import launch_over
+from warp_contact.data.model import Model
+from warp_contact.data.work import Work
+from warp_contact.kernels.surface import residual as kernels
+
+
+def find_gaps(model: Model, x: wp.array, work: Work) -> None:
+    """Set ``surface.residual`` at ``x``, and what of it is to be closed or searched."""
+    work.surface.of_step.zero_()
+    add_gaps(model, x, work)
+
+
+def add_gaps(model: Model, x: wp.array, work: Work) -> None:
+    """The same, in addition to what was found before in this step."""
+    c = work.contacts
+    launch_over(
+        kernels.residual_gaps,
+        work.capacity.contacts,
+        inputs=[c.n, c.record, c.constraint, work.dt, x],
+        outputs=[work.surface.residual, work.surface.found],
+    )
+
+
+def add_strays(model: Model, x: wp.array, work: Work) -> None:
+    """Count vertices that left the triangle of their contact, or lie below it, as overlaps."""
+    c = work.contacts
+    launch_over(
+        kernels.find_strays,
+        work.capacity.contacts,
+        inputs=[c.n, c.record, x],
+        outputs=[work.surface.found],
+    )

@@ -1,0 +1,61 @@
+"""The start of the impulses from those of the last step."""
+
+from warp_contact.data.launch import launch_over
+from warp_contact.data.work import Work
+from warp_contact.kernels.impulse import warm_start as kernels
+
+
+def recall_vertices(work: Work) -> None:
+    """Start the contacts of vertices from the last step; set the parts of all contacts."""
+    c = work.contacts
+    launch_over(
+        kernels.recall_vertices,
+        work.capacity.contacts,
+        inputs=[c.n_vertex, c.n, c.record, c.constraint, work.warm.partner, work.warm.kept],
+        outputs=[c.impulse, c.part],
+    )
+
+
+def recall_edges(work: Work) -> None:
+    """Let the contacts of edges go on from the impulses that they have."""
+    c, n = work.contacts, work.narrow_phase
+    launch_over(
+        kernels.recall_edges,
+        work.capacity.contacts,
+        inputs=[c.n_vertex, c.n, c.record, c.constraint, n.source, n.found],
+        outputs=[c.impulse],
+    )
+
+
+def keep_vertices(work: Work) -> None:
+    """Keep the impulses of the vertices for the next step."""
+    c = work.contacts
+    work.warm.partner.fill_(-1)
+    launch_over(
+        kernels.keep_vertices,
+        work.capacity.contacts,
+        inputs=[c.n_vertex, c.record, c.impulse],
+        outputs=[work.warm.partner, work.warm.kept],
+    )
+
+
+def keep_edges(work: Work) -> None:
+    """Keep the contacts of edges, with their impulses, for the next step."""
+    c, n = work.contacts, work.narrow_phase
+    launch_over(
+        kernels.keep_edges,
+        work.capacity.contacts,
+        inputs=[c.n_vertex, c.n, n.source, c.impulse],
+        outputs=[n.found, work.warm.edges, work.warm.n_edge],
+    )
+
+
+def forget_edges(work: Work) -> None:
+    """There are no contacts of edges for the next step to go on with."""
+    work.warm.n_edge.zero_()
+
+
+def forget(work: Work) -> None:
+    """There are no impulses to start the next step from."""
+    work.warm.partner.fill_(-1)
+    forget_edges(work)

@@ -12,8 +12,8 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-# Triangles are grown by this fraction for segments: one through the common edge of two triangles
-# must hit at least one of them, and one from a vertex in the skin of stage 1 the face above it.
+# Triangles are enlarged by this fraction for segments. One through the common edge of two triangles
+# must hit at least one of them; one from a vertex in the speculative margin must hit the next face.
 GROWN = wp.constant(1.0e-5)
 PARALLEL = wp.constant(1.0e-7)  # sine that float32 cannot tell from zero
 NONE = wp.constant(1.0e30)  # "no hit" for a distance or a parameter
@@ -48,7 +48,8 @@ def segment_hit(
 ) -> wp.vec3:
     """Parameter t and weights (v, w) of b and c where p + t u meets the triangle's plane.
 
-    t is NONE when the line misses the triangle or the sine to its plane is not above ``grazing``.
+    t is NONE when the line misses the triangle, or the sine of its angle to the plane is at most
+    ``grazing``.
     """
     e1 = b - a
     e2 = c - a
@@ -104,7 +105,7 @@ def triangle_closest(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
 
 @wp.func
 def lines_closest(p: wp.vec3, q: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.vec2:
-    """Parameters (s, u) of the closest points of the lines pq and ab; -1 when parallel."""
+    """Parameters (s, u) of the closest points of the lines pq and ab; -1 if parallel."""
     d1 = q - p
     d2 = b - a
     r = p - a

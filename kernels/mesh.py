@@ -1,7 +1,7 @@
-"""What the search for contacts reads of all bodies: one struct, so that kernels have few arguments.
+"""The meshes of all bodies, as the search for contacts reads them.
 
-Bodies are ranges of vertices, tets and triangles. ``warp_contact/data/model.py`` has the same
-arrays for the host.
+One struct, so that kernels have few arguments. Bodies are ranges of vertices, tets and triangles.
+``warp_contact/data/model.py`` has the same arrays for the host.
 """
 
 import warp as wp
@@ -13,7 +13,7 @@ wp.set_module_options(OPTIONS)
 
 @wp.struct
 class Mesh:
-    """Of all bodies and half-spaces."""
+    """The meshes of all bodies, and the half-spaces."""
 
     edge: float  # shortest mean edge of a body [m]
     n_body: int  # a body m >= n_body is half-space m - n_body
@@ -29,6 +29,6 @@ class Mesh:
     vs_start: wp.array[int]  # (n_vert + 1,) first entry of each vertex in vs_tri
     vs_tri: wp.array[int]  # (3 n_tri,) surface triangles at each vertex
     vn_start: wp.array[int]  # (n_vert + 1,) first entry of each vertex in vn_vert
-    vn_vert: wp.array[int]  # neighbours of each vertex along tet edges, ascending
+    vn_vert: wp.array[int]  # (2 n_link,) neighbours of each vertex along tet edges, ascending
     plane_n: wp.array[wp.vec3]  # (n_plane,) outward unit normals
     plane_h: wp.array[float]  # (n_plane,) offsets [m]

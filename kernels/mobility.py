@@ -1,8 +1,8 @@
-"""How a vertex answers an impulse: the one place that the contact solver asks.
+"""How a vertex answers an impulse: the only place where the contact solver looks this up.
 
-    dv_i = G_i p,   G_i = 1 / m_i, 0 for a vertex that is fixed       mobility   [1/kg]
+    dv_i = G_i p,   G_i = 1 / m_i, 0 for a fixed vertex               mobility   [1/kg]
 
-Every body is lumped: an impulse on a vertex moves no other vertex within the step.
+Masses are lumped: an impulse on a vertex moves no other vertex within the step.
 """
 
 import warp as wp
@@ -14,7 +14,7 @@ wp.set_module_options(OPTIONS)
 
 @wp.struct
 class Mobility:
-    """Of all vertices."""
+    """The mobilities of all vertices."""
 
     inv_mass: wp.array[float]  # (n_vert,) [1/kg]
 

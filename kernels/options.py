@@ -1,8 +1,8 @@
-"""How kernels are compiled; a GPU takes no notice of the flags.
+"""How kernels are compiled. The flags are for the CPU; a GPU ignores them.
 
-On a CPU, products and sums are contracted into one rounding, as they are on a GPU, and vectors are
-no wider than a ``vec4``. Warp lets the compiler look for vectors four operations deep, which is
-quick to compile. The formulas of a tet are deeper: there it pays to look further.
+On a CPU, a product and a sum are contracted into one rounding, as on a GPU, and vectors are no
+wider than a ``vec4``. By Warp's default the compiler looks for vectors four operations deep, which
+compiles fast. The formulas of a tet are deeper, and there a deeper search pays.
 """
 
 _FLAGS = (

@@ -1,4 +1,4 @@
-"""A part of a list in ascending order, by one thread: the parts are short."""
+"""Sorting a part of a list by one thread, for parts that are short."""
 
 import warp as wp
 
@@ -11,7 +11,7 @@ wp.set_module_options(OPTIONS)
 def sort(values: wp.array[int], first: int, end: int):
     """Sort the values from ``first`` to ``end``, in place (Shell 1959).
 
-    What is in order already costs one comparison each.
+    In each pass, a value that is in order already costs one comparison.
     """
     gap = (end - first) // 2
     while gap > 0:

@@ -137,49 +137,66 @@ ROOM = {"contacts": 4096, "pairs": 64}
 ROOM |= {"verts": 8192, "tets": 65536, "edges": 8192, "tris": 65536, "near": 65536}
 
 
-def _stages(scene, capacity=None, dt=1e-3) -> tuple:
-    from warp_contact.data.contacts import Capacity
+def _stages(scene, capacity=None, dt=1e-3, unit=1.0) -> tuple:
+    from warp_contact.data.overflow import Capacity
     from warp_contact.data.work import allocate_work
     from warp_contact.scene.assemble import assemble
 
     model, state = assemble(scene)
-    work = allocate_work(model, state, capacity or Capacity(**ROOM))
+    work = allocate_work(model, state, capacity or Capacity(**ROOM), unit=unit)
     work.dt.fill_(dt)
     return model, state, work
 
 
 @pytest.fixture
 def stages():
-    """Model, State and Work of ``stages(scene, capacity=..., dt=...)``, to run single stages."""
+    """Model, State and Work of ``stages(scene, capacity, dt, unit)``, to run single stages."""
     return _stages
 
 
-def _find_contacts(model, work, x0, x=None, edges=False, fresh=False) -> SimpleNamespace:
-    from warp_contact.step import broad_phase, step
+def _find_contacts(model, work, x0, x=None, edges=False, apart=False) -> SimpleNamespace:
+    from warp_contact.data.launch import if_any
+    from warp_contact.step import broad_phase, detection, impulse, narrow_phase
 
     x = x0 if x is None else x
     broad_phase.refresh(model, x0, x, work)
-    step.contacts(model, x0, x, work, fresh, edges)
-    assert not work.contacts.needed.numpy().any()
+    if edges:
+        (detection.detect_apart if apart else detection.detect)(model, x0, x, work)
+    elif apart:
+        narrow_phase.find_entered_vertices(model, x0, x, work)
+        if_any(work.contacts.n, impulse.begin, model, x0, work)
+    else:
+        detection.detect_vertices(model, x0, x, work)
+    assert not work.overflow.all.numpy().any()
     return _records(work)
 
 
 def _records(work) -> SimpleNamespace:
     c = work.contacts
     n = int(c.n.numpy()[0])
-    arrays = {k: a.numpy()[:n].copy() for k, a in vars(c).items() if k not in ("n", "start")}
-    return SimpleNamespace(n=n, start=c.start.numpy().copy(), **arrays)
+    fields = {"residual": work.surface.residual.numpy()[:n].copy()}
+    for array in (c.record, c.constraint):
+        structs = array.numpy()[:n]
+        fields |= {name: structs[name].copy() for name in structs.dtype.names}
+    impulse = c.impulse.numpy()[:n]  # two of its fields have names of the others
+    fields |= {f"{name}_impulse": impulse[name].copy() for name in ("normal", "friction")}
+    fields["ahead"] = impulse["ahead"].copy()
+    return SimpleNamespace(n=n, **fields)
 
 
 @pytest.fixture
 def find_contacts():
-    """Records after stages 1 and 2, ``find_contacts(model, work, x0, x, edges, fresh)``."""
+    """Contacts where they are looked for, ``find_contacts(model, work, x0, x, edges, apart)``."""
     return _find_contacts
 
 
 @pytest.fixture
 def records():
-    """Contact records as NumPy arrays, ``records(work)``."""
+    """Fields of all contacts as flat NumPy arrays, ``records(work)``.
+
+    Those of their record and constraint, ``normal_impulse``, ``friction_impulse``, ``ahead`` and
+    ``residual``.
+    """
     return _records
 
 
@@ -205,3 +222,18 @@ def jittered(rng):
         return TetMesh(regular.vertices + shift, regular.tets)
 
     return mesh
+
+
+@pytest.fixture
+def pile(rng, turned):
+    """Blocks that fall onto each other and a floor, all touching within a few frames."""
+    from warp_contact import NeoHookean, Scene, box
+
+    scene = Scene()
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    for k in range(8):
+        place = rng.uniform(-0.05, 0.05, 3) + [0.0, 0.0, 0.2 + 0.22 * k]
+        velocity = rng.uniform(-0.5, 0.5, 3) - [0.0, 0.0, 1.0 + 0.5 * k]
+        soft = NeoHookean(3e4, 0.3, 1000.0, 2e-3)
+        scene.add_body(box(0.16, 2), soft, place, turned(), velocity)
+    return scene

@@ -6,43 +6,34 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
-import warp as wp
 
+from warp_contact.data import switches
 from warp_contact.frame import step_bounds, stepper
+from warp_contact.kernels.impulse import constraint, tangent
 from warp_contact.kernels.narrow_phase import edge_contact, vertex_contact
-from warp_contact.step import broad_phase, depth, impulse, step, surface
+from warp_contact.step import search
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
 import ablation
-from ablating.off import without
-from ablating.parts import PARTS, Part
+from parts.off import number
+from parts.table import PARTS, Part
 
-OWNERS = (
-    broad_phase,
-    depth,
-    impulse,
-    step,
-    stepper,
-    step_bounds,
-    surface,
-    edge_contact,
-    vertex_contact,
-)
+OWNERS = constraint, edge_contact, search, step_bounds, stepper, tangent, vertex_contact
 
 
 @pytest.fixture
 def part():
-    """A part of which a figure depends on ``surface.BOUND``: ``part(with, without, least)``."""
+    """A part of which a figure depends on a bound: ``part(with, without, least)``."""
 
     def make(kept: float, off: float, least: float = 0.0) -> Part:
-        bound = surface.BOUND
+        bound = search.SEARCH_BOUND
 
         def case() -> dict[str, float]:
             """A number."""
-            return {"figure": kept if surface.BOUND == bound else off}
+            return {"figure": kept if search.SEARCH_BOUND == bound else off}
 
-        return Part("name", without(surface, "BOUND", 1.0), case, "figure", least)
+        return Part("name", number(search, "SEARCH_BOUND", 1.0), case, "figure", least)
 
     return make
 
@@ -70,7 +61,7 @@ def test_a_run_that_stops_early_is_worse_than_any(part):
     with mock.patch.object(ablation, "figures", lambda case: {"figure": 1.0}):
         stops = Part(
             "name",
-            without(surface, "BOUND", 1.0),
+            number(search, "SEARCH_BOUND", 1.0),
             mock.Mock(side_effect=SimulationError("not finite")),
             "figure",
             0.0,
@@ -88,15 +79,35 @@ def test_the_exit_status_tells_of_a_part_that_nothing_misses(part, monkeypatch, 
     assert "To be removed: name." in capsys.readouterr().out
 
 
+def off() -> list[str]:
+    """Names of the parts that are switched off."""
+    return [name for name in switches.PARTS if not switches.on(name)]
+
+
 def test_every_part_changes_something_and_is_back_afterwards():
     before = [dict(vars(owner)) for owner in OWNERS]
-    launch = wp.launch
     for part in PARTS.values():
         with part.off():
             changed = [dict(vars(owner)) for owner in OWNERS] != before
-            assert changed or wp.launch is not launch, part.name
+            assert changed or len(off()) == 1, part.name
         assert [dict(vars(owner)) for owner in OWNERS] == before
-        assert wp.launch is launch
+        assert off() == []
+
+
+def test_every_switch_of_the_package_is_in_the_table():
+    switched = set()
+    for part in PARTS.values():
+        with part.off():
+            switched |= set(off())
+    assert switched == set(switches.PARTS)
+
+
+def test_a_switch_is_refused_where_there_is_no_such_part_or_it_is_off():
+    with pytest.raises(KeyError):
+        switches.on("nothing")
+    with switches.without("edges"), pytest.raises(ValueError), switches.without("edges"):
+        pass
+    assert switches.on("edges")
 
 
 @pytest.mark.parametrize("name", ["entry", "deep end"])
@@ -113,7 +124,7 @@ def test_a_constant_of_a_kernel_is_another_one_and_then_the_same_again(name):
 
 def test_tilted_blocks_need_contacts_of_edges():
     line = ablation.compare(PARTS["edges"])
-    assert line.kept < 0.1  # the target of all collisions, tools/checks/collision.py
+    assert line.kept < 0.1  # the target of all collisions, tools/verification/collision.py
     # Without edges nothing keeps a corner out; it goes in by 5 % of an edge, and rounding in a
     # collision moves that by far less than the factor of 5 that is left here.
     assert line.off > 1.0

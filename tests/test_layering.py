@@ -1,4 +1,4 @@
-"""What each room may import, no circle, and the rules of a kernel's signature, read as text."""
+"""What each room may import, no circle, and how long files and functions may be."""
 
 import ast
 from graphlib import TopologicalSorter
@@ -29,7 +29,7 @@ MAY = {  # room: those that it may import, beside itself
 }
 LADDER = (  # of the kernel rooms: each may import those before it
     {"options"},
-    {"geometry", "sorting"},
+    {"geometry", "lengths", "mesh", "mobility", "sorting"},
     {"elastic"},
     {"motion"},
     {"broad_phase"},
@@ -45,7 +45,10 @@ ONLY_IN = {  # packages that the solver does without
     "meshio": {"scene/mesh"},
     "matplotlib": set(),
 }
-SECTIONS = ("in", "in, out", "out", "out, added to")
+# Folders whose files and functions are short.
+SIZED = ("warp_contact", "kernels", "scenes", "tests")
+LINES = 300  # of a file
+FUNCTION = 45  # lines of a host function, with its docstring
 
 
 def name_of(path: Path) -> str:
@@ -128,123 +131,23 @@ def test_an_optional_package_stays_in_its_place(package):
     assert {u for u in users if u not in allowed and u.split("/")[0] not in allowed} == set()
 
 
-def is_warp(node: ast.AST, name: str) -> bool:
-    return isinstance(node, ast.Attribute) and ast.unparse(node) == f"wp.{name}"
+def sized() -> list[Path]:
+    """Python files of the folders ``SIZED``, each once; two are links in the package."""
+    found = [path for folder in SIZED for path in sorted((ROOT / folder).rglob("*.py"))]
+    return [path for path in found if path == path.resolve()]
 
 
-def functions(path: Path, decorator: str) -> list[ast.FunctionDef]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return [
-        node
-        for node in tree.body
-        if isinstance(node, ast.FunctionDef)
-        and any(is_warp(d, decorator) for d in node.decorator_list)
-    ]
+def test_no_file_is_long():
+    lines = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in sized()}
+    assert len(lines) > 100
+    assert {path.relative_to(ROOT): n for path, n in lines.items() if n > LINES} == {}
 
 
-FUNCS = {node.name: node for path in KERNELS for node in functions(path, "func")}
-CASES = [
-    pytest.param(path, kernel, id=f"{path.stem}-{kernel.name}")
-    for path in KERNELS
-    for kernel in functions(path, "kernel")
-]
-
-
-def written(function: ast.FunctionDef) -> set[str]:
-    """Arguments that a kernel or function stores into, by itself, by atomics or through others."""
-    names = set()
-    for node in ast.walk(function):
-        if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
-            names.add(ast.unparse(node.value))
-        elif isinstance(node, ast.Call) and node.args:
-            name = ast.unparse(node.func).split(".")[-1]
-            if name.startswith("atomic_"):
-                names.add(ast.unparse(node.args[0]))
-            elif name in FUNCS:
-                called = FUNCS[name]
-                into = written(called)
-                for argument, value in zip(called.args.args, node.args, strict=False):
-                    if argument.arg in into:
-                        names.add(ast.unparse(value))
-    return names & {argument.arg for argument in function.args.args}
-
-
-def sections(path: Path, kernel: ast.FunctionDef) -> dict[str, str]:
-    """Section of each argument: the last comment line of its own above it."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    section, found = "", {}
-    arguments = {argument.lineno: argument.arg for argument in kernel.args.args}
-    for number in range(kernel.lineno, kernel.body[0].lineno):
-        text = lines[number - 1].strip()
-        if text.startswith("# "):
-            section = text[2:]
-        if number in arguments:
-            found[arguments[number]] = section
-    return found
-
-
-def is_array(argument: ast.arg) -> bool:
-    return argument.annotation is not None and "wp.array" in ast.unparse(argument.annotation)
-
-
-def test_there_are_kernels_to_check():
-    assert len(CASES) > 30
-
-
-@pytest.mark.parametrize(("path", "kernel"), CASES)
-def test_every_array_of_a_kernel_has_its_shape_in_a_comment(path, kernel):
-    lines = path.read_text(encoding="utf-8").splitlines()
-    arrays = [argument for argument in kernel.args.args if is_array(argument)]
-    bare = [a.arg for a in arrays if "  # " not in lines[a.lineno - 1]]
-    assert bare == []
-    assert not any("dtype=" in ast.unparse(a.annotation) for a in arrays)
-
-
-@pytest.mark.parametrize(("path", "kernel"), CASES)
-def test_a_kernel_lists_its_arguments_in_sections_and_keeps_to_them(path, kernel):
-    section = sections(path, kernel)
-    stored = written(kernel)
-    assert list(section) == [argument.arg for argument in kernel.args.args]
-    assert set(section.values()) <= set(SECTIONS)
-    assert {"out", "in, out", "out, added to"} & set(section.values())
-    assert {name for name in stored if section[name] == "in"} == set()
-    assert {name for name, s in section.items() if s != "in"} - stored == set()
-
-
-@pytest.mark.parametrize(("path", "kernel"), CASES)
-def test_a_kernel_says_what_a_thread_is(path, kernel):
-    of_many = any(argument.arg == "threads" for argument in kernel.args.args)
-    start = "For each" if of_many else "One thread"  # launch.py
-    assert (ast.get_docstring(kernel) or "").startswith(start)
-
-
-def called(node: ast.AST) -> set[str]:
-    """Names of the functions that are called within a piece of source."""
-    calls = [n.func for n in ast.walk(node) if isinstance(n, ast.Call)]
-    return {f.attr if isinstance(f, ast.Attribute) else getattr(f, "id", "") for f in calls}
-
-
-def test_no_query_begins_before_another_has_ended():
-    """On a GPU all queries of a thread share one stack."""
-    functions = {
-        node.name: node
-        for path in KERNELS
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.FunctionDef)
-    }
-    begin = {"bvh_query_aabb", "bvh_query_ray"}
-    asking: set[str] = set()
-    while True:  # those that ask, and those that call them
-        more = {name for name, node in functions.items() if called(node) & (begin | asking)}
-        if more == asking:
-            break
-        asking = more
-    assert {"first_hit", "closest_hit", "visit_edges"} <= asking
-    loops = 0
-    for name, node in functions.items():
-        for loop in (n for n in ast.walk(node) if isinstance(n, ast.While)):
-            if "bvh_query_next" in called(loop.test):
-                loops += 1
-                inside = set().union(*(called(statement) for statement in loop.body))
-                assert not inside & (begin | asking), name
-    assert loops > 5
+def test_no_function_of_the_host_is_long():
+    long = set()
+    for path in sized():
+        if not path.is_relative_to(ROOT / "kernels"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno >= FUNCTION:
+                    long.add(f"{path.relative_to(ROOT).as_posix()}: {node.name}")
+    assert long == set()

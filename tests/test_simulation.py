@@ -246,7 +246,7 @@ def test_without_memory_for_larger_buffers_the_last_frame_stays(monkeypatch):
 
     def outgrow(self, *rates):
         self._state.x.fill_(1.0)  # a frame that is not finished
-        self.work.contacts.needed.fill_(10_000)
+        self.work.overflow.all.fill_(10_000)
         return 1.0, (0.0, 0.0), ""
 
     with monkeypatch.context() as patch:

@@ -7,10 +7,10 @@ without over with. A figure is an error, or a time, so that less is better; ``le
 known to, and counts where the figure is less. A part earns its place where its line says at least
 1.5. The exit status is 1 when one does not: it is to be removed. Times are the best of some runs.
 
-The parts are switched off from outside, in ``ablating/off.py``; none is an option of the package.
-What cannot be reached like that, because it is inside a kernel and no constant of it turns it off,
-is not in the table. Nor is what cannot be left out: stage 1, the impulses of stage 5, and stage 3,
-which only says where stage 4 has to look.
+The parts are switched off by their names in ``warp_contact/data/switches.py``, or by a constant
+that the package has anyway; none is an option of a simulation. What cannot be left out is not in
+the table: the broad and the narrow phase, the impulses, and eq. (1), which only says where the
+search has to look.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import warp as wp
-from ablating.parts import PARTS, Part
+from parts.table import PARTS, Part
 
 from warp_contact import SimulationError
 

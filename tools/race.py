@@ -22,8 +22,8 @@ import numpy as np
 import warp as wp
 from charting import methods, ours, outside
 from charting.panel import Failed, Motion, Panel
-from checks.scenes import in_edges
 from pareto import cpu, versions
+from verification.scenes import in_edges
 
 import warp_contact as wc
 from warp_contact import scenes

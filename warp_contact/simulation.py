@@ -50,7 +50,7 @@ class Simulation:
                 shorter where bodies approach each other fast
             device: ``cpu``, ``cuda:0``, ...; None takes Warp's default
             sleeping: under gravity, bodies at rest are left alone until something comes near: a
-                settled pile costs next to nothing, at an accuracy that ``rest`` states
+                settled pile costs next to nothing, at an accuracy that ``frame/sleeping.py`` states
 
         Raises:
             ValueError: for an empty scene, an unknown device, fps or substeps that are not positive
@@ -167,8 +167,8 @@ class Simulation:
         if not np.isfinite(part).all():
             raise ValueError(f"{of} is not finite")
         self.state.v.assign(v)
-        if self._stepper.rest:
-            self._stepper.rest.wake(self._index(body))
+        if self._stepper.sleeping:
+            self._stepper.sleeping.wake(self._index(body))
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""
@@ -216,7 +216,7 @@ class Simulation:
         self.frame = int(values["frame"])
 
     def _fingerprint(self) -> str:
-        sleeping = self._stepper.rest is not None
+        sleeping = self._stepper.sleeping is not None
         settings = self.response, self.fps, self._stepper.wanted, sleeping
         return checkpoint.fingerprint(self.model, *settings)
 

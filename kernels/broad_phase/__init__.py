@@ -1,1 +1,1 @@
-"""Which vertices and edges may come to touch which bodies, for some steps."""
+"""Broad phase: which vertices and edges may touch which bodies during the next steps."""

@@ -1,24 +1,24 @@
-"""Boxes around bodies and triangles, grown by the skin of skins.py to last as long as these.
+"""Boxes around bodies and triangles, grown by the skin (skins.py) to hold as long as the pairs.
 
 Minimum and maximum do not depend on the order of their arguments, so atomics repeat bit for bit.
 """
 
 import warp as wp
 
+from warp_contact.kernels.lengths import BOX_GROWTH
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the body's box
-GROW = wp.constant(1.0e-5)  # of an edge: a flat triangle's box must not vanish for a ray
 
 
 @wp.func
 def next_in(boxes: wp.uint64, group: int, lo: wp.vec3, hi: wp.vec3, last: int) -> int:
     """The first box of a group after ``last`` that meets the one from lo to hi, or -1.
 
-    For loops with queries inside: on a GPU all queries of a thread share one stack, so that one has
-    to end before another begins.
+    For loops with queries inside: on a GPU all queries of a thread share one stack, so one has to
+    end before another begins.
     """
     first = int(-1)
     item = int(0)
@@ -93,6 +93,6 @@ def triangle_boxes(
     a = x[tris[t][0]]
     b = x[tris[t][1]]
     c = x[tris[t][2]]
-    g = skin[body] + GROW * body_edge[body]
+    g = skin[body] + BOX_GROWTH * body_edge[body]
     lower[t] = wp.min(wp.min(a, b), c) - wp.vec3(g, g, g)
     upper[t] = wp.max(wp.max(a, b), c) + wp.vec3(g, g, g)

@@ -1,6 +1,6 @@
 """Edges and triangles that may come to cross: no axis separates them by more than both skins.
 
-Threads append what they find to a list in any order; pairs.py sorts it.
+Threads append the pairs that they find to a list in any order; pairs.py sorts it.
 """
 
 import warp as wp
@@ -34,9 +34,9 @@ def gap_along(
 
 @wp.func
 def gap_to(p: wp.vec3, q: wp.vec3, t: wp.vec3i, enough: float, x: wp.array[wp.vec3]) -> float:
-    """Gap [m] of pq to triangle t along an axis of the separating axis theorem.
+    """Lower bound [m] on the distance of pq to triangle t, by the separating axis theorem.
 
-    Along the first axis with enough, else the largest: a distance that they keep.
+    The gap along the first axis where it exceeds ``enough``, else the largest gap of all axes.
     """
     a = x[t[0]]
     u = p - a

@@ -1,11 +1,11 @@
-"""Stage 1: which vertices may come to lie inside which tets of other bodies, by spatial hashing.
+"""Stage 2, broad phase: which vertices may enter which tets of other bodies, by spatial hashing.
 
 Teschner et al. 2003: cell (i, j, k) = floor(x / l), l the mean edge length, and
-hash = (i 73856093 xor j 19349663 xor k 83492791) mod n, here with the body mixed in: a tet looks
-for the vertices of one near body at a time. Vertices are inserted by a counting sort, with their
-true cell, so that a collision of hashes costs a comparison and nothing else. Each tet then visits
-the cells around it. What it finds within two skins (skins.py) is sorted by pairs.py. A
-half-space counts as a body with one tet.
+hash = (i 73856093 xor j 19349663 xor k 83492791) mod n. Here the body is hashed too, because a tet
+looks for the vertices of one near body at a time. A counting sort inserts the vertices. Their true
+cells are compared, so that a collision of hashes costs a comparison and nothing else. Each tet
+visits the cells around it. The vertices that it finds within both skins (skins.py) go to pairs.py.
+A half-space counts as a body with one tet.
 """
 
 import warp as wp
@@ -28,7 +28,7 @@ def cell_of(x: wp.vec3, size: float) -> wp.vec3i:
 
 @wp.func
 def hash_of(cell: wp.vec3i, body: int, n: int) -> int:
-    """Hash of a cell and a body: a tet looks for the vertices of one near body at a time."""
+    """Hash of a cell and a body."""
     h = wp.uint32(cell[0]) * wp.uint32(73856093)
     h = h ^ (wp.uint32(cell[1]) * wp.uint32(19349663))
     h = h ^ (wp.uint32(cell[2]) * wp.uint32(83492791))
@@ -49,7 +49,7 @@ def count_cells(
     # out, added to
     count: wp.array[int],  # (n_cell + 1,)
 ):
-    """One thread per vertex: its cell's hash, counted."""
+    """One thread per vertex: hash its cell, and count the vertices with this hash."""
     i = wp.tid()
     m = vert_body[i]
     key[i] = -1
@@ -88,7 +88,7 @@ def beyond(axis: wp.vec3, x: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3, reach:
 
 @wp.func
 def may_hold(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3, reach: float) -> bool:
-    """Whether no face of the tet, upright or inverted, keeps x further away than the reach."""
+    """Whether x is within the reach of the tet along all face normals; it may be inverted."""
     r = x - a
     e1 = b - a
     e2 = c - a
@@ -117,9 +117,9 @@ def visit_cells(
     found: wp.array[wp.vec2i],
     n_found: wp.array[int],
 ):
-    """Append the vertices of body m in the box from lo to hi that tet q may come to hold.
+    """Append the vertices of body m in the box from lo to hi that may enter tet q.
 
-    Where the box has more cells than the body has vertices, these are tried one by one.
+    If the box has more cells than the body has vertices, the vertices are tested one by one.
     """
     a = x[mesh.tets[q][0]]
     b = x[mesh.tets[q][1]]
@@ -160,7 +160,7 @@ def visit_tets(
     # out, added to
     n_found: wp.array[int],  # (1,)
 ):
-    """One thread per tet: the vertices of other bodies that it may come to hold."""
+    """One thread per tet: the vertices of other bodies that may enter it."""
     q = wp.tid()
     m = mesh.vert_body[mesh.tets[q][0]]
     if of.n_near[m] == 0:
@@ -211,7 +211,7 @@ def visit_planes(
     # out, added to
     n_found: wp.array[int],  # (1,)
 ):
-    """One thread per surface vertex: the planes that it may come to pass."""
+    """One thread per surface vertex: the planes that it may pass."""
     i = surf[wp.tid()]
     if awake[vert_body[i]] == 0:
         return

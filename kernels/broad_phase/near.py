@@ -1,9 +1,10 @@
-"""The bodies that may touch a body, and the parts of theirs that may.
+"""The bodies that may touch a body, and which of their parts may.
 
-Two bodies may touch unless their boxes, or the slabs that hold them along the line through the
-centres of their boxes, are apart. Of each near body the vertices and triangles that reach into the
-slab of the other one are boxed and listed: in a pile, a cap of it. A body that is near very many
-others, such as the floor of a pile, lists none of them: its parts ask the Bvh over the bodies.
+Two bodies are near each other if their boxes meet, and if they also meet when projected on the
+line through the centres of the boxes. The projection of a body is its slab. Of each near body, the
+vertices and triangles that reach into the slab of the other one are boxed, and the triangles are
+listed. In a pile, they are a cap of the body. A body with more than MANY near bodies, such as the
+floor of a pile, has no list: its parts query the Bvh over the bodies.
 """
 
 import warp as wp
@@ -14,9 +15,9 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-MANY = wp.constant(32)  # near bodies that are worth a list
-LARGE = wp.constant(512)  # vertices of a body that is taken by its box
-HUGE = wp.constant(1.0e5)  # cells along a body: more is not a body any longer
+MANY = wp.constant(32)  # near bodies in a list, at most
+LARGE = wp.constant(512)  # vertices; a larger body is represented by its box
+EXPLODED = wp.constant(1.0e5)  # cells along a body; a longer one has exploded
 
 
 @wp.func
@@ -35,7 +36,7 @@ def support(
     upper: wp.array[wp.vec3],
     x: wp.array[wp.vec3],
 ) -> float:
-    """Largest coordinate of a body and its skin along a unit axis [m], or more."""
+    """Largest coordinate of a body and its skin along a unit axis [m], or an upper bound."""
     if body_vert[body + 1] - body_vert[body] > LARGE:
         return box_support(axis, lower[body], upper[body])
     s = float(-1.0e30)
@@ -59,16 +60,16 @@ def near_bodies(
     # out
     n_near: wp.array[int],  # (n_body,), MANY + 1 for a body without a list
     near: wp.array2d[int],  # (n_body, MANY), ascending
-    slab: wp.array2d[wp.vec4],  # (n_body, MANY) axis towards the near body, where it begins [m]
-    end: wp.array2d[float],  # (n_body, MANY) where the own body ends along the axis [m]
+    slab: wp.array2d[wp.vec4],  # (n_body, MANY) axis towards the near body, its begin along it [m]
+    end: wp.array2d[float],  # (n_body, MANY) where body m ends along the axis [m]
     # out, added to
     some: wp.array[int],  # (1,) 1 when any body is near another
 ):
-    """One thread per body: list the bodies of its world that may touch it, if one is awake."""
+    """One thread per body: list the bodies of its world that may touch it, if either is awake."""
     m = wp.tid()
     n_near[m] = 0
-    # What has exploded has no contacts, and no loop over its cells.
-    if not wp.length(upper[m] - lower[m]) < HUGE * cell:
+    # A body that has exploded gets no contacts: the loop over its cells would not end.
+    if not wp.length(upper[m] - lower[m]) < EXPLODED * cell:
         return
     count = int(0)
     other = int(0)
@@ -98,7 +99,7 @@ def near_bodies(
 
 @wp.struct
 class Part:
-    """A part of a body: its corners, and the box around them and their skin."""
+    """A part of a body: its corners, its skin, and the box around both."""
 
     a: wp.vec3
     b: wp.vec3
@@ -132,18 +133,18 @@ def reaches(p: Part, slab: wp.vec4) -> bool:
 
 @wp.struct
 class NearPart:
-    """What of a near body reaches into the slab of the own one."""
+    """The part of a near body that reaches into the slab of body m."""
 
     vert_lower: wp.vec3  # box of the vertices [m]
     vert_upper: wp.vec3
     tri_lower: wp.vec3  # box of the triangles [m]
     tri_upper: wp.vec3
-    tris: wp.vec2i  # first and end of these triangles in a list
+    tris: wp.vec2i  # first and end of these triangles in ``near_tri``
 
 
 @wp.struct
 class Near:
-    """Where to look for the bodies near a body; lists have the shape (n_body, MANY)."""
+    """The bodies near each body; lists have the shape (n_body, MANY)."""
 
     bodies: wp.uint64  # Bvh over the boxes, grouped by world
     world: wp.array[int]  # (n_body,)
@@ -151,9 +152,9 @@ class Near:
     upper: wp.array[wp.vec3]  # (n_body,)
     n_near: wp.array[int]  # (n_body,) MANY + 1 for a body without a list
     near: wp.array2d[int]  # ascending
-    slab: wp.array2d[wp.vec4]  # axis, and where the near body begins along it [m]
-    end: wp.array2d[float]  # where the own body ends along it [m]
-    part: wp.array2d[NearPart]  # of the near body, up to there
+    slab: wp.array2d[wp.vec4]  # axis towards the near body, its begin along it [m]
+    end: wp.array2d[float]  # where body m ends along it [m]
+    part: wp.array2d[NearPart]  # of the near body, as far as body m reaches
 
 
 @wp.kernel
@@ -169,7 +170,7 @@ def near_parts(
     # out, added to
     count: wp.array[int],  # (1,)
 ):
-    """One thread per entry of the lists; triangles that do not fit are counted and left out."""
+    """One thread per entry of the lists: its part. Triangles that do not fit are only counted."""
     m, k = wp.tid()
     if of.n_near[m] > MANY or k >= of.n_near[m]:
         return
@@ -228,7 +229,7 @@ def fits(
     # out, added to
     needed: wp.array[int],  # (1,) largest number that did not fit
 ):
-    """One thread."""
+    """One thread: report the count if it did not fit, and reset it."""
     if count[0] > capacity:
         wp.atomic_max(needed, 0, count[0])
     count[0] = 0

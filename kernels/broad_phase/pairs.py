@@ -1,7 +1,8 @@
-"""Candidates by pair: of a vertex and a body with tets of it, of an edge and one with triangles.
+"""Pairs of the broad phase: a vertex and a body with tets of it, an edge and one with triangles.
 
-Threads append (owner, item) in any order. A counting sort by owner and a sort of each owner's items
-leave no trace of that order. Items are numbered by body, so that those of a pair follow each other.
+The vertex or edge is the owner, the tets or triangles are the items. Threads append (owner, item)
+in any order. A counting sort by owner and a sort of the items of each owner leave no trace of that
+order. Items are numbered by body, so those of a pair follow each other.
 """
 
 import warp as wp
@@ -25,7 +26,7 @@ class PairList:
 
 @wp.func
 def append(owner: int, item: int, found: wp.array[wp.vec2i], n_found: wp.array[int]):
-    """Add to a list; what does not fit is counted all the same."""
+    """Append to a list; an entry that does not fit is only counted."""
     k = wp.atomic_add(n_found, 0, 1)
     if k < found.shape[0]:
         found[k] = wp.vec2i(owner, item)
@@ -41,7 +42,7 @@ def count_items(
     count: wp.array[int],  # (n_owner + 1,)
     needed: wp.array[int],  # (1,) largest number of items that did not fit
 ):
-    """For each item; none is counted when they do not fit."""
+    """For each item: count it for its owner; none is counted when they do not fit."""
     if n_found[0] > found.shape[0]:
         wp.atomic_max(needed, 0, n_found[0])
         return
@@ -60,7 +61,7 @@ def fill_items(
     # out
     item: wp.array[int],  # (capacity,) by owner, unsorted
 ):
-    """For each item."""
+    """For each item: write it into the list of its owner."""
     if n_found[0] > found.shape[0]:
         return
     for e in range(wp.tid(), n_found[0], threads):
@@ -135,5 +136,5 @@ def any_pairs(
     # out
     some: wp.array[int],  # (1,) 1 when there are pairs of either kind
 ):
-    """One thread."""
+    """One thread: whether there is any pair."""
     some[0] = wp.where(verts[0] + edges[0] > 0, 1, 0)

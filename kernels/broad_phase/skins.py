@@ -1,41 +1,41 @@
-"""What may touch while nothing moves further than a skin: found once, kept for many steps.
+"""Broad phase: pairs that hold while nothing moves further than a skin (Verlet 1967).
 
-Candidates are found at the positions of some step. As long as no vertex is further than the skin of
-its body from there, all that touches is among them, and the steps test them exactly: the same
-contacts come out as without (Verlet 1967). They are found again once the prediction of some vertex
-is as far away as is free; the rest of the skin is reserved for what impulses and the closure add
-within a step: they may stop the body, and what is near may push it on. A body that has become
-FASTER than that is looked at anew too.
+Pairs are found at the positions of some step and kept for many steps. As long as no vertex is
+further from there than the skin of its body, all contacts are among them. Each step tests them
+exactly, so it finds the same contacts as with new pairs. They are found again once the predicted
+position of a vertex is further away than ``free``. The rest of the skin is a reserve for what
+impulses and the closure add within a step: they may stop the body, and its neighbours may push it.
+They are also found again when a body moves further than FASTER reserves in a step.
 
-    free    = max(looks d, LEAST e / 2) + D / 2     [m]
-    reserve = max(d, LEAST e / 2) + D / 2           [m]     skin = free + reserve
+    free    = max(looks d, LEAST_SKIN e / 2) + D / 2     [m]
+    reserve = max(d, LEAST_SKIN e / 2) + D / 2           [m]     skin = free + reserve
 
 d is the largest motion of the body in a step, D that of the bodies near it, e the shortest edge.
-The number of looks is the same for all bodies, and such that looks d is MEAN edges on average: some
-fast bodies do not wear out the candidates of a pile at rest, and where all are fast the lists stay
-short. What swings does not go far: candidates last several times as long. A body that has nothing
-near, even if all had the LONGEST, gets it.
+``looks`` is for how many steps the pairs should last. It is the same for all bodies, and such that
+looks d is MEAN_SKIN edges on average. A few fast bodies then do not use up the pairs of a pile at
+rest, and skins stay narrow where all bodies are fast. A vibrating body stays near its place, so its
+pairs last several times longer. A body with nothing near it, even with LONGEST for all, gets that.
 
-Most candidates are not close to touching. A pair that is found apart by some distance sleeps until
-both bodies have come that way together; ``way`` adds up the largest motion of a body in each look.
+Most pairs are not close to touching. Where a pair is some distance apart, it is left alone until
+its two bodies together have travelled that distance. The distance travelled by a body is the sum of
+its largest motions from one detection pass to the next.
 """
 
 import warp as wp
 
 from warp_contact.kernels.broad_phase.near import MANY, Near
 from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.lengths import LEAST_SKIN, MEAN_SKIN
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-LEAST = wp.constant(0.02)  # of the shortest edge, with friction and closure at rest in mind
-MEAN = wp.constant(0.08)  # of the shortest edge: longer lists cost more than they save
-SHORTEST = wp.constant(1.0)  # looks
-LONGEST = wp.constant(32.0)  # looks
-UNIT = wp.constant(1.0e4)  # counts of an edge, for a sum that does not depend on its order
-FASTER = wp.constant(2.0)  # reserves in a step: what was slow when it was found
-CAREFUL = wp.constant(0.99)  # part of a distance that rounding leaves
-FADING = wp.constant(0.8)  # of a motion from look to look
+SHORTEST = wp.constant(1.0)  # steps
+LONGEST = wp.constant(32.0)  # steps
+MOTION_UNIT = wp.constant(1.0e4)  # counts of an edge: a sum of integers has no order
+FASTER = wp.constant(2.0)  # reserves in a step: the body was slower when its pairs were found
+CAREFUL = wp.constant(0.99)  # part of a distance that is safe from rounding
+FADING = wp.constant(0.8)  # of a recorded motion from one detection pass to the next
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the maximum
 
 
@@ -45,13 +45,13 @@ def moved(
     vert_body: wp.array[int],  # (n_vert,)
     free: wp.array[float],  # (n_body,) [m]
     skin: wp.array[float],  # (n_body,) [m]
-    built: wp.array[wp.vec3],  # (n_vert,) [m] positions of the candidates
+    built: wp.array[wp.vec3],  # (n_vert,) [m] positions at which the pairs were found
     x0: wp.array[wp.vec3],  # (n_vert,) [m]
     x1: wp.array[wp.vec3],  # (n_vert,) [m]
     # out, added to
-    stale: wp.array[int],  # (1,) 1 when the candidates have to be found again
+    stale: wp.array[int],  # (1,) 1 when the pairs have to be found again
 ):
-    """One thread per vertex: whether it is further than is free, or too fast for the reserve."""
+    """One thread per vertex: whether it is beyond ``free``, or too fast for the reserve."""
     i = wp.tid()
     d = wp.max(wp.length_sq(x0[i] - built[i]), wp.length_sq(x1[i] - built[i]))
     most = free[vert_body[i]]
@@ -66,11 +66,11 @@ def track(
     vert_body: wp.array[int],  # (n_vert,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
-    last: wp.array[wp.vec3],  # (n_vert,) [m] positions of the last look
+    last: wp.array[wp.vec3],  # (n_vert,) [m] positions of the last detection pass
     # out, added to
     motion: wp.array[float],  # (n_body,) [m] largest motion since then
 ):
-    """One thread per CHUNK of vertices."""
+    """One thread per CHUNK of vertices: the largest motions of their bodies."""
     first = wp.tid() * CHUNK
     body = vert_body[first]
     largest = float(0.0)
@@ -91,24 +91,24 @@ def find_fastest(
     motion: wp.array[float],  # (n_body,) [m]
     # out, added to
     fastest: wp.array[float],  # (1,) [m]
-    total: wp.array[int],  # (1,) sum of the motions, none above an edge, in edges / UNIT
+    total: wp.array[int],  # (1,) sum of the motions, none above an edge, in edges / MOTION_UNIT
 ):
-    """One thread per body."""
+    """One thread per body: the motion of the fastest, and the sum of all motions."""
     m = wp.tid()
     wp.atomic_max(fastest, 0, motion[m])
-    wp.atomic_add(total, 0, int(UNIT * wp.min(motion[m] / edge, 1.0)))
+    wp.atomic_add(total, 0, int(MOTION_UNIT * wp.min(motion[m] / edge, 1.0)))
 
 
 @wp.func
 def looks_at(total: int, n_body: int) -> float:
-    """Looks that candidates last."""
-    mean = float(total) / (UNIT * float(n_body))
-    return wp.clamp(MEAN / wp.max(mean, 1.0e-6), SHORTEST, LONGEST)
+    """Steps that the pairs should last."""
+    mean = float(total) / (MOTION_UNIT * float(n_body))
+    return wp.clamp(MEAN_SKIN / wp.max(mean, 1.0e-6), SHORTEST, LONGEST)
 
 
 @wp.func
 def of_motion(motion: float, edge: float, times: float) -> float:
-    return wp.max(times * motion, 0.5 * LEAST * edge)
+    return wp.max(times * motion, 0.5 * LEAST_SKIN * edge)
 
 
 @wp.kernel
@@ -120,7 +120,7 @@ def widest_skins(
     # out
     skin: wp.array[float],  # (n_body,) [m]
 ):
-    """One thread per body: the longest that it may get."""
+    """One thread per body: the widest skin that it may get."""
     m = wp.tid()
     own = of_motion(motion[m], edge, LONGEST) + of_motion(motion[m], edge, 1.0)
     skin[m] = own + fastest[0]
@@ -128,7 +128,7 @@ def widest_skins(
 
 @wp.func
 def spare(m: int, looks: float, edge: float, motion: wp.array[float]) -> wp.vec3:
-    """By how much a skin for so many looks is less wide than the widest."""
+    """By how much a skin for so many steps is narrower than the widest one [m]."""
     d = of_motion(motion[m], edge, LONGEST) - of_motion(motion[m], edge, looks)
     return wp.vec3(d, d, d)
 
@@ -137,7 +137,7 @@ def spare(m: int, looks: float, edge: float, motion: wp.array[float]) -> wp.vec3
 def meet_within(
     m: int, other: int, looks: float, edge: float, motion: wp.array[float], of: Near
 ) -> bool:
-    """Whether the boxes of two bodies meet with skins for so many looks."""
+    """Whether the boxes of two bodies meet with skins for so many steps."""
     a = spare(m, looks, edge, motion)
     b = spare(other, looks, edge, motion)
     return boxes_meet(of.lower[m] + a, of.upper[m] - a, of.lower[other] + b, of.upper[other] - b)
@@ -156,7 +156,7 @@ def choose_skins(
     stale: wp.array[int],  # (1,) 0
     some: wp.array[int],  # (1,) 0
 ):
-    """One thread per body."""
+    """One thread per body: its skin, and the part of it that is free."""
     m = wp.tid()
     looks = looks_at(total[0], motion.shape[0])
     push = float(0.0)
@@ -187,9 +187,9 @@ def go_on(
     pace: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
     way: wp.array[float],  # (n_body + n_plane,) [m]
     # out
-    n_new: wp.array[int],  # (1,) 0: a look at the edges begins to count
+    n_new: wp.array[int],  # (1,) 0: the new contacts of edges are counted from here on
 ):
-    """One thread per body."""
+    """One thread per body: add its motion to the distance that it has travelled."""
     m = wp.tid()
     if m == 0:
         n_new[0] = 0

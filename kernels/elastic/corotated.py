@@ -5,18 +5,17 @@
     dP  = 2 mu (dF - dR) + lam (cof F : dF) cof F + lam (J - 1) dcof F
     dR  = R [w]x,  (tr S I - S) w = axl(R^T dF),  S = sym(R^T F)
 
-F = R S is the polar decomposition with det R = +1 even for an inverted tet, whose S then has
+F = R S is the polar decomposition, with det R = +1 even for an inverted tet, whose S then has
 one negative eigenvalue. mu, lam are the Lame parameters [Pa], beta the damping time [s] of the
 viscous stress in ``tet.viscous_stress``. For a Poisson ratio of 0 a bar stretched by s carries
-P = E (s - 1). A row of ``param`` is (mu, lam, beta).
-
-R comes from the closed form of Markley, which maximises tr(R^T F) over the rotations:
+P = E (s - 1). R comes from the closed form of Markley, which maximises tr(R^T F) over the
+rotations:
 
     R = ((k + |F|^2) F + y cof F - F F^T F) / z,  k = (y^2 - |F|^2)/2,  z = k y - J
     y   largest root of y^4 - 2 |F|^2 y^2 - 8 J y + |F|^4 - 4 |cof F|^2
 
-z = (s1 + s2)(s2 + s3)(s3 + s1) with the signed singular values s. Where it vanishes R jumps
-(collapsed to a line, or mirrored), and a singular value decomposition picks one of the maximisers.
+z = (s1 + s2)(s2 + s3)(s3 + s1) with the signed singular values s. Where z vanishes (a tet collapsed
+to a line, or mirrored), R jumps. There a singular value decomposition picks one of the maximisers.
 
 Sources: Stomakhin et al. 2012, "Energetically consistent invertible elasticity";
 Markley 1993, "Attitude determination using vector observations: a fast optimal matrix algorithm".
@@ -25,13 +24,14 @@ Markley 1993, "Attitude determination using vector observations: a fast optimal 
 import warp as wp
 
 from warp_contact.kernels.elastic import tet as element
+from warp_contact.kernels.elastic.hyperelastic import ROW, kernels_of
 from warp_contact.kernels.options import ARITHMETIC
 
 wp.set_module_options(ARITHMETIC)
 
-ROW = wp.vec3  # of param
+__all__ = ["ROW", "apply_damping", "apply_stiffness", "energies", "set_forces"]
 
-NEWTON = wp.constant(8)  # most steps from sqrt(3) |F|, which is above the root and exact at rest
+NEWTON = wp.constant(8)  # steps at most, from sqrt(3) |F|: above the root, and exact at rest
 ROUNDING = wp.constant(1.0e-6)  # of the quartic in y, relative to |F|^4
 DEGENERATE = wp.constant(1.0e-2)  # z / |F|^3 below which float32 loses the closed form
 
@@ -47,7 +47,7 @@ def rotation(f: wp.mat33) -> wp.mat33:
     for _ in range(NEWTON):
         p = ((y * y - 2.0 * n2) * y - 8.0 * j) * y + n4
         slope = (4.0 * y * y - 4.0 * n2) * y - 8.0 * j
-        if p <= ROUNDING * n2 * n2 or slope <= 0.0:  # from above: p falls to its rounding error
+        if p <= ROUNDING * n2 * n2 or slope <= 0.0:  # from above, down to the rounding error of p
             break
         y -= p / slope
     k = 0.5 * (y * y - n2)
@@ -68,7 +68,7 @@ def rotation_differential(f: wp.mat33, r: wp.mat33, df: wp.mat33) -> wp.mat33:
     c = element.cof(m)
     z = wp.dot(element.column(m, 0), element.column(c, 0))
     n2 = wp.ddot(f, f)
-    # R has no differential where z = 0: the floor keeps its growth next to the jump finite.
+    # R has no differential where z = 0. The floor keeps dR finite next to the jump.
     z = wp.max(z, DEGENERATE * n2 * wp.sqrt(n2) + 1.0e-30)
     w = c * wp.vec3(b[2, 1] - b[1, 2], b[0, 2] - b[2, 0], b[1, 0] - b[0, 1]) / z
     return r * wp.skew(w)
@@ -102,87 +102,6 @@ def energy_density(g: wp.mat33, mu: float, lam: float) -> float:
     return mu * wp.ddot(strain, strain) + 0.5 * lam * j * j
 
 
-@wp.kernel
-def set_forces(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    mask: wp.array[int],  # (n_tet,) tets with 0 are skipped
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner forces, minus the energy gradient."""
-    r = wp.tid()
-    q = tet[r]
-    if mask[q] == 0:
-        return
-    g = element.displacement_gradient(q, tets, pose, x)
-    m = -volume[q] * param[r]  # stresses are linear in the moduli
-    element.store_stress(q, stress(g, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def apply_stiffness(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    dx: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner entries of K(x) dx."""
-    r = wp.tid()
-    q = tet[r]
-    g = element.displacement_gradient(q, tets, pose, x)
-    df = element.rate(q, tets, pose, dx)
-    m = volume[q] * param[r]
-    element.store_stress(q, stress_differential(g, df, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def apply_damping(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner entries of C(x) v."""
-    r = wp.tid()
-    q = tet[r]
-    f = element.rate(q, tets, pose, x)
-    df = element.rate(q, tets, pose, v)
-    m = volume[q] * param[r][2] * param[r]
-    element.store_stress(q, element.viscous_stress(f, df, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def energies(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    energy: wp.array[float],  # (n_tet,) [J]
-):
-    """One thread per tet of the model: set its elastic energy."""
-    r = wp.tid()
-    q = tet[r]
-    g = element.displacement_gradient(q, tets, pose, x)
-    energy[q] = volume[q] * energy_density(g, param[r][0], param[r][1])
+set_forces, apply_stiffness, apply_damping, energies = kernels_of(
+    stress, stress_differential, energy_density, __name__
+)

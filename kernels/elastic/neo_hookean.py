@@ -3,19 +3,17 @@
     psi = mu/2 (I_C - 3) - mu (J - 1) + l/2 (J - 1)^2 + l b        energy density    [Pa]
     P   = mu F + (l (J - 1 + b') - mu) cof F                       first Piola stress [Pa]
     dP  = mu dF + l (1 + b'') (cof F : dF) cof F + (l (J - 1 + b') - mu) dcof F
-    l   = lam + mu                                 so that small strains see (mu, lam)
+    l   = lam + mu                                 so that small strains have the moduli (mu, lam)
     b   = -10 (J - J0)^2 ln(J / J0)  for J < J0 = 1/4, its tangent parabola below 1/20, else 0
 
 I_C = F : F, J = det F; mu, lam are the Lame parameters of small strain [Pa], beta the damping
-time [s] of the viscous stress in ``tet.viscous_stress``. P is a polynomial in F, but for the
-logarithm between 1/20 and 1/4: it is finite and pushes back for flat and inverted tets.
+time [s] of the viscous stress in ``tet.viscous_stress``. P is a polynomial in F, except for the
+logarithm between 1/20 and 1/4. It is finite and pushes back for flat and inverted tets.
 
-Without b (not in the source) a column whose sides are free carries at most 0.23, 0.81 or 2.2 E
-along its axis, for a ratio of 0, 0.3 or 0.4; what presses harder turns it inside out, however short
-the step. b adds nothing to the pressure above J0, 14 l at J = 1/20 and 32 l at J = 0; l = 1.8 E for
-a ratio of 0.4.
-
-A row of ``param`` is (mu, lam, beta).
+The barrier b is not in the source. Without it a column with free sides carries at most 0.23, 0.81
+or 2.2 E along its axis, for a Poisson ratio of 0, 0.3 or 0.4. A larger load turns it inside out,
+however short the step. b adds nothing to the pressure above J0, 14 l at J = 1/20 and 32 l at J = 0.
+l is 1.8 E for a ratio of 0.4.
 
 Energies are written in the Green strain E = (F^T F - I)/2, because I_C - 3 cancels in float32:
 
@@ -27,16 +25,17 @@ Source: Smith, de Goes, Kim 2018, "Stable neo-Hookean flesh simulation".
 import warp as wp
 
 from warp_contact.kernels.elastic import tet as element
+from warp_contact.kernels.elastic.hyperelastic import ROW, kernels_of
 from warp_contact.kernels.options import ARITHMETIC
 
 wp.set_module_options(ARITHMETIC)
 
-ROW = wp.vec3  # of param
+__all__ = ["ROW", "apply_damping", "apply_stiffness", "energies", "set_forces"]
 
 
 SQUASHED = wp.constant(0.25)  # J0
-FLAT = wp.constant(0.05)  # J below which b is a parabola
-STEEP = wp.constant(10.0)
+CRUSHED = wp.constant(0.05)  # J below which b is a parabola
+BARRIER = wp.constant(10.0)
 
 
 @wp.func
@@ -45,19 +44,19 @@ def barrier(j: float) -> wp.vec3:
     k = 1.0 + j
     if k >= SQUASHED:
         return wp.vec3(0.0, 0.0, 0.0)
-    c = wp.max(k, FLAT)
+    c = wp.max(k, CRUSHED)
     d = c - SQUASHED
     log = wp.log(c / SQUASHED)
-    value = -STEEP * d * d * log
-    slope = -STEEP * (2.0 * d * log + d * d / c)
-    bend = -STEEP * (2.0 * log + 4.0 * d / c - d * d / (c * c))
+    value = -BARRIER * d * d * log
+    slope = -BARRIER * (2.0 * d * log + d * d / c)
+    bend = -BARRIER * (2.0 * log + 4.0 * d / c - d * d / (c * c))
     e = k - c
     return wp.vec3(value + e * slope + 0.5 * e * e * bend, slope + e * bend, bend)
 
 
 @wp.func
 def stress(g: wp.mat33, mu: float, lam: float) -> wp.mat33:
-    """P at F = I + g, with no term that stays finite and cancels as g goes to 0."""
+    """P at F = I + g, without finite terms that cancel as g goes to 0."""
     cof_g = element.cof(g)
     j = element.dilation(g, cof_g)
     difference = (
@@ -85,92 +84,11 @@ def energy_density(g: wp.mat33, mu: float, lam: float) -> float:
     e = 0.5 * (g + wp.transpose(g) + wp.transpose(g) * g)
     i = wp.trace(e)
     shear = i - j
-    if j > -0.5:  # for J near -1 the quotient is 0/0, and nothing cancels any more
+    if j > -0.5:  # near J = -1 the quotient is 0/0, and there is no cancellation
         shear = (i * j - 4.0 * wp.trace(element.cof(e)) - 8.0 * wp.determinant(e)) / (j + 2.0)
     return mu * shear + (lam + mu) * (0.5 * j * j + barrier(j)[0])
 
 
-@wp.kernel
-def set_forces(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    mask: wp.array[int],  # (n_tet,) tets with 0 are skipped
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner forces, minus the energy gradient."""
-    r = wp.tid()
-    q = tet[r]
-    if mask[q] == 0:
-        return
-    g = element.displacement_gradient(q, tets, pose, x)
-    m = -volume[q] * param[r]  # stresses are linear in the moduli
-    element.store_stress(q, stress(g, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def apply_stiffness(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    dx: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner entries of K(x) dx."""
-    r = wp.tid()
-    q = tet[r]
-    g = element.displacement_gradient(q, tets, pose, x)
-    df = element.rate(q, tets, pose, dx)
-    m = volume[q] * param[r]
-    element.store_stress(q, stress_differential(g, df, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def apply_damping(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
-    # out
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
-):
-    """One thread per tet of the model: set its corner entries of C(x) v."""
-    r = wp.tid()
-    q = tet[r]
-    f = element.rate(q, tets, pose, x)
-    df = element.rate(q, tets, pose, v)
-    m = volume[q] * param[r][2] * param[r]
-    element.store_stress(q, element.viscous_stress(f, df, m[0], m[1]), pose, f_tet)
-
-
-@wp.kernel
-def energies(
-    # in
-    tet: wp.array[int],  # (n,) tet ids
-    param: wp.array[wp.vec3],  # (n,) mu [Pa], lam [Pa], beta [s]
-    tets: wp.array[wp.vec4i],  # (n_tet,)
-    pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
-    volume: wp.array[float],  # (n_tet,) [m^3]
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # out
-    energy: wp.array[float],  # (n_tet,) [J]
-):
-    """One thread per tet of the model: set its elastic energy."""
-    r = wp.tid()
-    q = tet[r]
-    g = element.displacement_gradient(q, tets, pose, x)
-    energy[q] = volume[q] * energy_density(g, param[r][0], param[r][1])
+set_forces, apply_stiffness, apply_damping, energies = kernels_of(
+    stress, stress_differential, energy_density, __name__
+)

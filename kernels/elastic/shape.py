@@ -2,7 +2,7 @@
 
     G = D E,  change = largest |entry| of G^T G - 1        D edges of the tet now, E inverse before
 
-E is kept from the positions to compare with. A tet that was flat then has changed without limit.
+E is stored at the positions to compare with. A tet that was flat there has changed without limit.
 """
 
 import warp as wp
@@ -22,7 +22,7 @@ def remember(
     # out
     before: wp.array[wp.mat33],  # (n_tet,) [1/m] E
 ):
-    """One thread per tet."""
+    """One thread per tet: store its shape."""
     q = wp.tid()
     before[q] = wp.inverse(element.edges(tets[q], x))
 
@@ -35,11 +35,11 @@ def changes(
     pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
     before: wp.array[wp.mat33],  # (n_tet,) [1/m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    least: float,  # volume of a tet that is not flat, of that at rest
+    least: float,  # part of its rest volume below which a tet is flat
     # out, added to
-    change: wp.array2d[float],  # (2, n_body) largest of its tets; 1 where one is flat
+    change: wp.array2d[float],  # (2, n_body) largest of its tets; 1 if one of them is flat
 ):
-    """One thread per tet."""
+    """One thread per tet: its change of shape, and whether it is flat."""
     q = wp.tid()
     g = element.rate(q, tets, before, x)
     s = wp.transpose(g) @ g - wp.identity(n=3, dtype=float)

@@ -1,4 +1,4 @@
-"""The three springs on one tet: forces, products with the stiffness, energy.
+"""The three kinds of springs on one tet: forces, products with the stiffness, energy.
 
 Formulas, units and the columns of ``param`` stand in ``springs.py``. Rows of a mat43 belong to the
 corners of the tet: positions p [m], displacements or velocities u, forces f [N].
@@ -12,7 +12,7 @@ from warp_contact.kernels.options import ARITHMETIC
 wp.set_module_options(ARITHMETIC)
 
 mat43 = wp.types.matrix(shape=(4, 3), dtype=float)
-TINY = wp.constant(1.0e-2)  # of the rest size, below which the turning stiffness stops to grow
+TINY = wp.constant(1.0e-2)  # of the rest size: below it the stiffness against turning grows no more
 
 
 @wp.func

@@ -5,10 +5,10 @@
     C = (A - A0) / A0,   A = |a x b| / 2                  area, over a surface triangle
     C = (V - V0) / V0,   V = a . (b x c) / 6              volume, signed, over a tet
     K dx = k (dC (dC . dx) + C ddC dx)                    stiffness, dC = dC/dx
-    C_damp v = beta k dC (dC . v)                         damping: K at rest, but never negative
+    C_damp v = beta k dC (dC . v)                         damping: as K at rest, but never negative
 
-C does not change under rigid motion, which is therefore not damped. A spring shared by
-several tets is split among them, so that every tet stands alone. Columns of ``param``:
+Rigid motion does not change C and is therefore not damped. A spring shared by
+several tets is split among them, so that each tet is computed by itself. Columns of ``param``:
 
      0 -  5  energies of the edges 01, 02, 03, 12, 13, 23     [J], share of this tet
      6 - 11  their rest lengths D                             [m]

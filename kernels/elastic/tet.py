@@ -7,7 +7,7 @@
     f0 = -(f1 + f2 + f3)            V rest volume [m^3], f [N]
     cof F = dJ/dF = J F^-T          J = det F
 
-Near rest F = I + G with a small G, and float32 keeps G far better than what is left of 1 + G:
+Near rest F = I + G with a small G, which float32 resolves far better than 1 + G:
 
     J - 1   = tr G + tr cof G + det G
     cof F   = (1 + tr G) I - G^T + cof G

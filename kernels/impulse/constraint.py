@@ -1,34 +1,37 @@
-"""What the sweeps need of a contact: set once, when the contacts of a step are known.
+"""What the sweeps need of each contact: set once, when the contacts of a step are known.
 
 Contact c has vertices k with signed weights a_k (positive on the side that moves along n).
 
     W = sum a_k^2 N_k / m_k                      N_k contacts share vertex k    [1/kg]
     W_t = W and what the torque adds             tangent.py                     [1/kg]
-    c = (g0 - rest) / h                          approach that is allowed       [m/s]
+    c = (g0 - rest) / h                          gap bound                      [m/s]
 
-W is the inverse effective mass, with the share m_k / N_k of a vertex that each contact sees. The
-gap g0 at the start of the step may close to a resting gap at its end, not further. Without that
-hair's breadth the ends of an edge on a face would count as inside or outside by rounding, and the
-narrow phase would lose the edge.
+W is the inverse effective mass: each contact sees the share m_k / N_k of a vertex. W_t includes the
+torque. c is how fast the sides may approach: the gap g0 at the start of the step may close to the
+resting gap at its end, not further. Without a resting gap, rounding would decide whether the ends
+of an edge on a face are inside, and the narrow phase would lose the edge.
 """
 
 import warp as wp
 
 from warp_contact.kernels.impulse.tangent import mat53, slope, torque_weight
+from warp_contact.kernels.lengths import REST_GAP
 from warp_contact.kernels.mobility import Mobility, mobility_of
-from warp_contact.kernels.narrow_phase.contact import REST, Contact, gap, gradient
+from warp_contact.kernels.narrow_phase.contact import Contact, gap, gradient
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, contacts_of
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-TURN = wp.constant(0.1)  # gap times gradient above which a surface cannot take the torque
-STEEP = wp.constant(8.0)  # gradient times edge of a triangle too thin or too tilted for it
+TURN = wp.constant(0.1)  # gap times gradient, above which the surface cannot take the torque
+WIDE = wp.constant(0.1)  # the same, above which there is no friction
+COUNTED = wp.constant(1.0)  # part of the torque's weight that the sweeps count
+TILTED = wp.constant(8.0)  # gradient times edge, above which a facet is too thin or tilted for it
 
 
 @wp.struct
 class Constraint:
-    """Of one contact, for one step."""
+    """The constants of one contact in a step."""
 
     inv_mass: float  # W [1/kg], 0 where nothing can move
     inv_mass_turning: float  # W_t [1/kg]
@@ -41,7 +44,7 @@ class Constraint:
 
 @wp.struct
 class Impulse:
-    """Of one contact, in a step."""
+    """The impulses of one contact in a step."""
 
     normal: float  # lambda [N s]
     friction: wp.vec3  # p_t [N s]
@@ -75,7 +78,7 @@ def begin_contacts(
     constraint: wp.array[Constraint],  # (capacity,)
     impulse: wp.array[Impulse],  # (capacity,)
 ):
-    """For each contact: what holds it, and no impulse yet on the new ones."""
+    """For each contact: its constants, and no impulse yet on the new ones."""
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
         to = Constraint()
@@ -83,24 +86,25 @@ def begin_contacts(
         to.inv_mass = w
         to.inv_mass_turning = w
         to.gap = gap(at, x0)
-        to.gap_bound = (to.gap - REST * at.edge) / dt[0]
+        to.gap_bound = (to.gap - REST_GAP * at.edge) / dt[0]
         to.friction = friction
         largest = float(0.0)
         if w > 0.0 and not at.on_plane:
             for k in range(5):
                 to.turn[k] = gradient(k, at, x0)
                 largest = wp.max(largest, wp.length(to.turn[k]))
-        if largest * at.edge > STEEP:
+        if largest * at.edge > TILTED:
             to.turn = mat53()
         elif w > 0.0 and not at.on_plane:
             to.ramp = slope(at, x0)
-        if largest * wp.abs(to.gap) > TURN or at.on_plane:
+        across = largest * wp.abs(to.gap)
+        if across > WIDE and not at.on_plane:
+            to.friction = 0.0
+            to.ramp = wp.vec3(0.0, 0.0, 0.0)
+        if across > TURN or at.on_plane:
             to.gap = 0.0
-            if not at.on_plane:
-                to.friction = 0.0
-                to.ramp = wp.vec3(0.0, 0.0, 0.0)
         if to.gap != 0.0 and (to.friction > 0.0 or wp.length_sq(to.ramp) > 0.0):
-            to.inv_mass_turning = w + torque_weight(at, graph, bodies, to.gap, to.turn)
+            to.inv_mass_turning = w + COUNTED * torque_weight(at, graph, bodies, to.gap, to.turn)
         constraint[c] = to
         if c >= first[0]:
             impulse[c] = Impulse()

@@ -1,21 +1,21 @@
-"""Normal impulses and Coulomb friction, all contacts at once, by mass splitting.
+"""Stage 5, impulses: normal impulses and Coulomb friction, all contacts at once, by mass splitting.
 
     u = sum a_k v_k                              relative velocity              [m/s]
     lambda <- max(0, lambda - (u . n + c) / W_t) c > 0: the gap that may close  [N s]
     p_t <- p_t - u_t / W_t, |p_t| <= mu lambda                                  [N s]
     v_k += a_k (d lambda n + d p_t) / m_k        with the whole mass
 
-with a_k, c and W_t of constraint.py: u . n >= -c. What the gap and a leaning facet do to u_t, p_t
-and W_t is in tangent.py.
+The symbols a_k, c and W_t are those of constraint.py; the result is u . n >= -c. tangent.py says
+how a gap and a leaning facet change u_t, p_t and W_t.
 
 Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add kinetic energy
-(Tonge, Benevolenski and Voroshilov 2012). Equal and opposite per contact: momentum is kept exactly.
-A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
+(Tonge, Benevolenski and Voroshilov 2012). The impulses of a contact are equal and opposite, so
+momentum is kept exactly. A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
 
-Sweep j runs from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
-method, except at a contact where that change was a step too far. The last sweep is a plain one.
-Most contacts are soon done, and few clusters last long: between the first and the last sweep a
-contact is left alone while neither its impulses nor the velocities of its vertices change.
+Sweep j starts from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
+method, except at contacts where that change was too large. The last sweep is a plain one. Most
+contacts converge soon, a few clusters late. Between the first and the last sweep a contact is left
+alone while neither its impulses nor the velocities of its vertices change.
 """
 
 import warp as wp
@@ -35,7 +35,7 @@ class Limits:
     """When the sweeps end."""
 
     tolerance: float  # of an edge: approach in a step that needs another sweep
-    negligible: float  # [m] a change in a step that needs no other contact to be looked at again
+    negligible: float  # [m] a smaller change in a step is negligible for other contacts
     sweeps: int  # at most
 
 
@@ -72,7 +72,7 @@ def clear_parts(c: int, part: wp.array[wp.vec3]):
 
 @wp.func
 def part_of(k: int, c: Contact, to: Constraint, p: wp.vec3) -> wp.vec3:
-    """What an impulse of a contact is at its vertex k, with the torque across the gap [N s]."""
+    """The part of a contact's impulse p at its vertex k, with the torque across the gap [N s]."""
     return c.coef[k] * p + to.gap * wp.dot(to.turn[k], p) * c.normal
 
 
@@ -81,17 +81,17 @@ def solve_contacts(
     # in
     threads: int,
     limits: Limits,
-    last: bool,  # leave the impulses where this sweep projects them
+    last: bool,  # do not extrapolate the impulses after this sweep
     sweep_number: wp.array[int],  # (1,)
     dt: wp.array[float],  # (1,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
-    changed: wp.array[int],  # (n_vert,) the last sweep if it changed the velocity
+    changed: wp.array[int],  # (n_vert,) last sweep if it changed the velocity
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # in, out
-    impulse: wp.array[Impulse],  # (capacity,) accumulated in this step; ``ahead`` is in v
-    busy: wp.array[int],  # (capacity,) 2 when this sweep changed the impulses, 1 little, 0 not
+    impulse: wp.array[Impulse],  # (capacity,) accumulated in this step; v includes ``ahead``
+    busy: wp.array[int],  # (capacity,) 2 if this sweep changed the impulses, 1 negligibly, 0 not
     # out
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] what this sweep adds at each vertex
     served: wp.array[int],  # (n_vert,) this sweep where it adds something
@@ -173,7 +173,7 @@ def apply_impulses(
 def apply_sweep(
     # in
     threads: int,
-    negligible: float,  # [m] a change in a step that needs no other contact to be looked at again
+    negligible: float,  # [m] a smaller change in a step is negligible for other contacts
     sweep: wp.array[int],  # (1,)
     dt: wp.array[float],  # (1,) [s]
     graph: ContactGraph,
@@ -186,7 +186,7 @@ def apply_sweep(
     # out
     changed: wp.array[int],  # (n_vert,) this sweep where it changed the velocity, else 0
 ):
-    """For each vertex that a sweep serves: add what it adds."""
+    """For each vertex to which this sweep adds something: add it."""
     for k in range(wp.tid(), graph.n_touched[0], threads):
         i = graph.touched[k]
         if served[i] != sweep[0]:

@@ -1,9 +1,9 @@
-"""What forces of one pass share: each contact is given a normal impulse, friction follows from it.
+"""Friction of the responses with one pass: it follows from the normal impulse of each contact.
 
     p_t = -min(mu lambda, |u_t| / W_t) u_t^       friction, W_t of tangent.py [N s]
 
-The vertices receive the torque of friction across a gap as in tangent.py; u is the plain relative
-velocity, without the turning.
+The vertices receive the torque of friction across a gap as in tangent.py. u is the plain relative
+velocity, without the turning of the surface.
 """
 
 import warp as wp

@@ -1,7 +1,7 @@
 """The contact force between two bodies: impulses summed over a frame, in any order.
 
-Threads race for the slots of a table and for its sums. Impulses are added as integers, whose sum
-has no order, so the result repeats bit for bit.
+Threads race for the slots of a hash table and for its sums. Impulses are added as integers, whose
+sum does not depend on the order, so the result repeats bit for bit.
 """
 
 import warp as wp
@@ -21,7 +21,7 @@ def add(
     key: wp.array[wp.int64],
     total: wp.array2d[wp.int64],
 ) -> bool:
-    """Add an impulse to its pair of bodies; False when the table has no room for the pair."""
+    """Add an impulse to its pair of bodies; False if the table is full."""
     p = impulse
     lo = pair[0]
     hi = pair[1]
@@ -57,7 +57,7 @@ def add_pair_impulses(
     # in, out
     key: wp.array[wp.int64],  # (n_pair,) lower body * 2^32 + upper body, -1 where free
     total: wp.array2d[wp.int64],  # (n_pair, 3) on the lower body, since the frame began
-    needed: wp.array[int],  # (1,) one more than there is room for, where it is short
+    needed: wp.array[int],  # (1,) one more than the capacity, where that is too small
 ):
     """For each contact: add its impulse to its pair, as integers."""
     for c in range(wp.tid(), n_contact[0], threads):

@@ -1,4 +1,4 @@
-"""The response the paper compares with: a force proportional to the penetration depth.
+"""The response that the paper compares with: a force proportional to the penetration depth.
 
 Heidelberger et al. 2004, with Coulomb friction as in Keiser et al. 2004 (one_pass.py):
 

@@ -7,9 +7,9 @@ of the idea with the contacts of this package:
     g = (sum a_k x*_k) . n - offset               its gap                         [m]
     lambda = h F,  F = max(0, -g) / (h^2 W)       normal impulse of a step        [N s]
 
-with W of constraint.py, where N_k contacts share vertex k. A single contact is closed exactly: F
-moves its two sides by h^2 W F against each other. Where N contacts ask the same of a vertex, each
-gives it the N-th part. Friction (one_pass.py) acts against the slip of v*.
+with W of constraint.py, where N_k contacts share vertex k. A single contact closes exactly: F moves
+its two sides by h^2 W F relative to each other. Where N contacts need the same of a vertex, each
+gives it the N-th part. Friction (one_pass.py) acts against the sliding velocity of v*.
 """
 
 import warp as wp

@@ -1,8 +1,8 @@
-"""Impulses of the last step, as a start for those of the next.
+"""Warm start: the impulses of a step start from those of the last step.
 
-What rests on something needs almost the same impulses in every step. A vertex keeps those of its
-first contact, by the body that it touches; an edge keeps those of all its contacts, with the
-contacts themselves (persistent.py). Where the normal has turned, the tangential impulse turns too.
+A resting body needs almost the same impulses in every step. A vertex keeps the impulse of its first
+contact, with the body that it touches. An edge keeps all its contacts with their impulses
+(persistent.py). Where the normal has turned, the tangential impulse turns too.
 """
 
 import warp as wp
@@ -37,7 +37,7 @@ def started(p: wp.vec4) -> Impulse:
 
 @wp.func
 def kept_of(p: Impulse) -> wp.vec4:
-    """Tangential and normal impulse, as they are kept."""
+    """Tangential and normal impulse, as they are kept for the next step."""
     return wp.vec4(p.friction[0], p.friction[1], p.friction[2], p.normal)
 
 
@@ -60,9 +60,9 @@ def recall_vertices(
     # in, out
     impulse: wp.array[Impulse],  # (capacity,)
     # out
-    part: wp.array[wp.vec3],  # (5 capacity,) [N s] what they are at each vertex
+    part: wp.array[wp.vec3],  # (5 capacity,) [N s] their parts at each vertex
 ):
-    """For each contact; those of edges have their impulses already."""
+    """For each contact: start it from the last step. Those of edges have their impulses already."""
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
         to = constraint[c]
@@ -87,7 +87,7 @@ def recall_edges(
     # out
     impulse: wp.array[Impulse],  # (capacity,)
 ):
-    """For each contact of an edge: go on from its impulses; it has no ramp."""
+    """For each contact of an edge: start it from its last impulses; it has no ramp."""
     for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
         if constraint[c].inv_mass > 0.0:
             level = wp.vec3(0.0, 0.0, 0.0)
@@ -106,7 +106,7 @@ def keep_vertices(
     partner: wp.array[int],  # (n_vert,)
     kept: wp.array[wp.vec4],  # (n_vert,) [N s]
 ):
-    """For each contact of a vertex."""
+    """For each contact of a vertex that is its first: keep its impulses."""
     n = wp.min(n_vertex[0], contact.shape[0])
     for c in range(wp.tid(), n, threads):
         if is_first(c, n, contact):

@@ -1,1 +1,1 @@
-"""Time stepping of vertices, the modes that limit the step, and who sleeps."""
+"""Time stepping of the vertices, the modes that limit the step, and sleeping bodies."""

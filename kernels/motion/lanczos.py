@@ -3,7 +3,7 @@
     a_j       = q_j . M A q_j                              [1/s^2]
     b_j q_j+1 = A q_j - a_j q_j - b_{j-1} q_{j-1}          q_i . M q_j = 1 for i = j, else 0
 
-A is self-adjoint in the mass inner product and couples no two bodies, so every body has its own
+A is self-adjoint in the mass inner product and does not couple bodies, so every body has its own
 a, b. Sums run over chunks of vertices, then over the chunks of a body, in fixed order and in
 double precision: runs repeat bit for bit. The coefficients of a body are a column of ``coef``,
 whose rows are b_{-1}^2, a_0, b_0^2, a_1, b_1^2, ... with b_{-1}^2 the square of the start vector.
@@ -18,7 +18,7 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-BREAKDOWN = wp.constant(wp.float64(1.0e-10))  # b^2 / a^2 that is rounding of float32 vectors
+BREAKDOWN = wp.constant(wp.float64(1.0e-10))  # b^2 / a^2 at which float32 vectors are rounding
 
 
 @wp.kernel
@@ -55,7 +55,7 @@ def multiply(
     # out
     part: wp.array[wp.float64],  # (n_chunk,), q_j . M A q_j
 ):
-    """One thread per chunk of vertices."""
+    """One thread per chunk of vertices: apply A, and sum for a_j."""
     k = wp.tid()
     s = wp.float64(0.0)
     for i in range(chunk[k], chunk[k + 1]):

@@ -7,15 +7,15 @@
 ``vt_corner`` lists the corners at a vertex as 4 tet + corner. They are added in the order of
 that list and never by atomics, so runs repeat bit for bit.
 
-Damping M dv/dt = -C v over h, in s stages of RKL1 over h / a, that count by the share a:
+Damping M dv/dt = -C v over h, in s stages of RKL1 over h / a, whose result counts by the share a:
 
     Y_0 = v,  Y_j = (2j-1)/j Y_{j-1} - (j-1)/j Y_{j-2} - (2j-1)/j 2h/(a (s^2+s)) M^-1 C Y_{j-1}
     v' = (1 - a) v + a Y_s = p v,  p = 1 - a + a P_s(1 - 2 z/(a (s^2+s))),  z = h L, L of M^-1 C
 
-with P_s Legendre. p = 1 - z + O(z^2), and |p| <= 1 for z < a (s^2+s). For a = 1/2 no mode turns
-round, 0 < p; a larger share reaches further with as many stages. Damping comes first, so that rest
-does not depend on it, and Euler is v' = p v - h w^2 x, x' = x + h v': stable for
-(h w)^2 < 2 (1 + p).
+with P_s the Legendre polynomial. p = 1 - z + O(z^2), and |p| <= 1 for z < a (s^2+s). For a = 1/2 no
+mode changes sign, 0 < p. A larger share allows a larger z with as many stages. Damping comes before
+the forces, so that the state at rest does not depend on it. For a mode of frequency w, Euler then
+is v' = p v - h w^2 x, x' = x + h v': stable for (h w)^2 < 2 (1 + p).
 
 Source of RKL1: Meyer, Balsara, Aslam 2014, "A stabilized Runge-Kutta-Legendre method for
 explicit super-time-stepping of parabolic and mixed equations".

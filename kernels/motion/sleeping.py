@@ -1,23 +1,20 @@
-"""Which bodies are at rest, and which of them need no steps until something comes near.
+"""Sleeping: which bodies are at rest, and which islands of them need no steps for now.
 
-A body is at rest as long as its vertices stay within STILL of where they were when it began, and
-none is faster than FAST. Slower velocities tell little: contacts at rest rattle in their gaps. It
-may sleep when it has been so for some frames, and with it all bodies of its island: those whose
-boxes meet, one after the other, all grown by the way of the fastest body in a frame. So nothing
-that moves, and nothing that this may push on, reaches what sleeps before the next frame. Bodies of
-which all vertices are fixed hold others, but do not make an island of them.
+A body is at rest as long as its vertices stay within STILL of where its rest began, and none is
+faster than FAST. Lower speeds tell little, because resting contacts rattle in their gaps. An island
+is a set of bodies connected by boxes that meet. The boxes are grown by the distance that the
+fastest body travels in a frame. An island sleeps when all its bodies have been at rest for some
+frames. So no moving body, nor one that it pushes, can reach a sleeping body before the next frame.
+A body with all vertices fixed supports others, but does not connect them to an island.
 """
 
 import warp as wp
 
 from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.lengths import FAST, ISLAND_GAP, STILL
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
-
-STILL = wp.constant(2.0e-3)  # of an edge: how far a body at rest may move
-FAST = wp.constant(0.02)  # of an edge in a frame: the speed of what is on its way
-TOUCH = wp.constant(0.02)  # of an edge: boxes this close meet
 
 
 @wp.kernel
@@ -27,7 +24,7 @@ def watch(
     vert_body: wp.array[int],  # (n_vert,)
     body_edge: wp.array[float],  # (n_body,) [m]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
-    anchor: wp.array[wp.vec3],  # (n_vert,) [m] where the vertices were
+    anchor: wp.array[wp.vec3],  # (n_vert,) [m] where the rest of its body began
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out, added to
@@ -35,7 +32,7 @@ def watch(
     speed: wp.array[float],  # (1,) [m/s] of the fastest vertex
     mobile: wp.array[int],  # (n_body,) 1 when a vertex is not fixed
 ):
-    """One thread per vertex: a fixed one that is given a velocity always moves."""
+    """One thread per vertex: whether it moves. A fixed one with a velocity always does."""
     i = wp.tid()
     m = vert_body[i]
     u = wp.length(v[i])
@@ -44,7 +41,7 @@ def watch(
         mobile[m] = 1
     elif u > 0.0:
         moved[m] = 1
-    near = wp.length(x[i] - anchor[i]) <= STILL * body_edge[m]  # not so for what is not a number
+    near = wp.length(x[i] - anchor[i]) <= STILL * body_edge[m]  # False for NaN
     if not near or time * u > FAST * body_edge[m]:
         moved[m] = 1
 
@@ -74,16 +71,16 @@ def count_rest(
     moved: wp.array[int],  # (n_body,)
     speed: wp.array[float],  # (1,) [m/s]
     # in, out
-    frames: wp.array[int],  # (n_body,) at rest so far
+    frames: wp.array[int],  # (n_body,) for which it has been at rest
     # out
-    awake: wp.array[int],  # (n_body,) 1 for a body that moves
+    awake: wp.array[int],  # (n_body,) 1 until it has rested for long enough
     reach: wp.array[float],  # (n_body,) [m] what its box grows by
 ):
-    """One thread per body."""
+    """One thread per body: count its frames at rest."""
     m = wp.tid()
     frames[m] = wp.where(moved[m] == 1, 0, wp.min(frames[m] + 1, wanted))
     awake[m] = wp.where(frames[m] < wanted, 1, 0)
-    reach[m] = TOUCH * body_edge[m] + time * (speed[0] + time * gravity)
+    reach[m] = ISLAND_GAP * body_edge[m] + time * (speed[0] + time * gravity)
 
 
 @wp.kernel
@@ -97,9 +94,9 @@ def wake_island(
     # in, out
     awake: wp.array[int],  # (n_body,)
     # out, added to
-    again: wp.array[int],  # (1,) 1 when a body woke up
+    again: wp.array[int],  # (1,) 1 when another body woke up
 ):
-    """One thread per body: it stays awake next to one that is."""
+    """One thread per body: wake it if its box meets that of one awake."""
     m = wp.tid()
     if awake[m] == 1 or mobile[m] == 0:
         return
@@ -120,9 +117,9 @@ def pause_vertices(
     # out
     pliant: wp.array[float],  # (n_vert,) [1/kg] inv_mass, 0 asleep
     v: wp.array[wp.vec3],  # (n_vert,) [m/s] 0 asleep
-    impulse: wp.array[wp.vec3],  # (n_vert,) [N s] of the frame: the last one asleep, else 0
+    impulse: wp.array[wp.vec3],  # (n_vert,) [N s] of the frame: unchanged asleep, else 0
 ):
-    """One thread per vertex; on fixed ones, what is awake may press in every frame."""
+    """One thread per vertex: stop it if asleep; a fixed one gets a new impulse in every frame."""
     i = wp.tid()
     pliant[i] = 0.0
     if awake[vert_body[i]] == 1:
@@ -141,7 +138,7 @@ def pause_tets(
     # out
     mask: wp.array[int],  # (n_tet,) 0 asleep
 ):
-    """One thread per tet."""
+    """One thread per tet: whether it is awake."""
     q = wp.tid()
     mask[q] = awake[tet_body[q]]
 
@@ -154,7 +151,7 @@ def clear_pairs(
     key: wp.array[wp.int64],  # (n_pair,) of pair_impulses.py
     total: wp.array2d[wp.int64],  # (n_pair, 3)
 ):
-    """One thread per slot: forget the pairs of a body awake; the others keep their last force."""
+    """One thread per slot: forget pairs with a body awake; the others keep their last force."""
     k = wp.tid()
     if key[k] < wp.int64(0):
         return

@@ -1,1 +1,1 @@
-"""Which of them do in a step: depth, direction, triangle and weights of each contact."""
+"""Narrow phase: the contacts of a step, each with depth, direction, triangle and weights."""

@@ -1,14 +1,15 @@
-"""What a contact is: five weighted vertices and a direction; its gap, and how it turns.
+"""What a contact is: five weighted vertices and a direction, its gap and its rotation.
 
 A contact joins a vertex, or a point of an edge, to a point of a triangle or of its edge. The first
-two vertices are of the body that moves along the normal n, the others of the other one. Places that
-are not used repeat a vertex, with weight zero.
+two vertices belong to the body that moves along the normal n, the others to the other body. Unused
+places repeat a vertex, with weight zero.
 
     g = (sum a_k x_k) . n - offset        gap of five weighted vertices along a direction   [m]
     b_k                                   how the direction turns with the vertices         [1/m]
 
-When the vertices of a surface move by u_k, its normal turns by -sum b_k (n . u_k): b_k = grad w_k
-over a triangle, and over two edges the same in the basis of their directions.
+When the vertices of a surface move by u_k, its normal turns by -sum b_k (n . u_k). Over a triangle
+b_k = grad w_k, the gradient of its weight. Over two edges it is the same in the basis of their
+directions.
 """
 
 import warp as wp
@@ -17,7 +18,6 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-REST = wp.constant(2.0e-4)  # of an edge: the gap that is left between bodies at rest
 
 vec5i = wp.types.vector(length=5, dtype=wp.int32)
 vec5 = wp.types.vector(length=5, dtype=wp.float32)
@@ -25,12 +25,12 @@ vec5 = wp.types.vector(length=5, dtype=wp.float32)
 
 @wp.struct
 class Contact:
-    """What the narrow phase finds."""
+    """A contact as the narrow phase finds it."""
 
     vert: vec5i
     coef: vec5  # a_k, all 0 for a vertex inside a body that makes no contact
     normal: wp.vec3  # n, 0 where there is no contact
-    depth: float  # at detection, 0 of an edge that goes on [m]
+    depth: float  # at detection, 0 for a persistent contact [m]
     offset: float  # of a plane, else 0 [m]
     pair: wp.vec2i  # the two bodies, n_body + p for plane p
     on_plane: bool
@@ -39,7 +39,7 @@ class Contact:
 
 @wp.func
 def gap(c: Contact, x: wp.array[wp.vec3]) -> float:
-    """Gap of a contact [m]; positions relative to one vertex keep float32 exact far out."""
+    """Gap of a contact [m]; relative to one vertex, as float32 is coarse far from the origin."""
     origin = x[c.vert[0]]
     if c.on_plane:
         return wp.dot(origin, c.normal) - c.offset
@@ -51,7 +51,7 @@ def gap(c: Contact, x: wp.array[wp.vec3]) -> float:
 
 @wp.func
 def relative_velocity(c: Contact, v: wp.array[wp.vec3]) -> wp.vec3:
-    """Of the two sides of a contact [m/s]."""
+    """Relative velocity of the two sides of a contact [m/s]."""
     u = wp.vec3(0.0, 0.0, 0.0)
     for k in range(5):
         u += c.coef[k] * v[c.vert[k]]

@@ -1,4 +1,4 @@
-"""The contacts at each vertex, as a list sorted by contact: sums over it repeat bit for bit.
+"""The contacts at each vertex, in a list sorted by contact: sums over it repeat bit for bit.
 
 An entry is 5 c + k for vertex k of contact c. A vertex of weight zero has one too: it may receive a
 part of a torque.
@@ -41,14 +41,14 @@ def total_contacts(
     # in
     of_verts: wp.array[int],  # (1,) contacts
     of_edges: wp.array[int],  # (1,) contacts, behind them
-    places: wp.array[int],  # (1,) taken by edges' contacts, with gaps between them
+    places: wp.array[int],  # (1,) places taken by contacts of edges, some unused
     capacity: int,
     # out
     n_contact: wp.array[int],  # (1,)
     # out, added to
     needed: wp.array[int],  # (1,) largest number that did not fit
 ):
-    """One thread: the number of contacts."""
+    """One thread: the number of contacts, and what did not fit."""
     n = of_verts[0] + of_edges[0]
     n_contact[0] = wp.min(n, capacity)
     if wp.max(n, places[0]) > capacity:
@@ -66,7 +66,7 @@ def count_entries(
     # out, added to
     count: wp.array[int],  # (n_vert + 1,)
 ):
-    """For each contact."""
+    """For each contact: count its entries."""
     if wp.tid() == 0:
         n_touched[0] = 0
     for c in range(wp.tid(), n_contact[0], threads):

@@ -1,20 +1,20 @@
-"""Consistent penetration depth and direction.
+"""Stage 4, depth: consistent penetration depth and direction.
 
-Heidelberger et al. 2004. A penetration is (vertex i, body N). Those at the border have a tet edge
-to a vertex outside N; with x_k the crossing of such an edge with N's surface nearest the outer end,
-n_k the normal there and w_k = 1 / |x_k - p|^2,
+Heidelberger et al. 2004. A penetration is a vertex i at p in a body N. A vertex at the border has
+tet edges to vertices outside N. Let x_k be the crossing of such an edge with the surface of N that
+is nearest to the outer end, n_k the normal there and w_k = 1 / |x_k - p|^2. Then
 
     d(p) = sum w_k (x_k - p) . n_k / sum w_k          depth [m]
     r(p) = normalise(sum w_k n_k)                     direction, out of N
 
-The others take it over from processed neighbours p_j, layer by layer, with m_j = 1 / |p_j - p|^2:
+The others take both from neighbours p_j that have a depth, layer by layer, m_j = 1 / |p_j - p|^2:
 
     d(p) = sum m_j ((p_j - p) . r_j + d_j) / sum m_j
     r(p) = normalise(sum m_j r_j)
 
-All tet edges take part: with surface edges alone, a vertex inside a flat face has in-plane
+All tet edges take part. With surface edges alone, a vertex inside a flat face would have in-plane
 neighbours only. Terms with (x_k - p) . n_k <= 0 leave by a side that faces away and are dropped. So
-are those through a side that the vertex does not look against (opposing.py).
+are terms through a face that no face of the vertex opposes (opposing.py).
 """
 
 import warp as wp
@@ -89,7 +89,7 @@ def begin_layer(
     layer: wp.array[int],  # (1,) the layer that is filled next
     pending: wp.array[int],  # (1,)
 ):
-    """One thread: count the layer; ``pending`` stays 0 unless it has a penetration."""
+    """One thread: begin a layer; ``pending`` stays 0 unless the layer has a penetration."""
     layer[0] = layer[0] + 1
     pending[0] = 0
 
@@ -107,7 +107,7 @@ def propagate(
     penetration: wp.array[Penetration],  # (capacity,)
     pending: wp.array[int],  # (1,) 1 when this layer has a penetration
 ):
-    """For each penetration without depth: take it over from neighbours of earlier layers."""
+    """For each penetration without depth: take one from neighbours of earlier layers."""
     capacity = penetration.shape[0]
     n_inside = wp.min(inside_at[inside_at.shape[0] - 1], capacity)
     for e in range(wp.tid(), n_inside, threads):

@@ -1,30 +1,31 @@
 """The contact of a surface edge with a body that it crosses.
 
-The paper leaves edge against edge out, but its own scenes need it. An edge pq enters N through the
+The paper leaves out edge against edge, but its scenes need it. An edge pq enters N through the
 triangle t1 and leaves by t2.
 
-    ridge     t1 and t2 share an edge ab: n = +-(pq x ab), on the side of n1 + n2; the contact joins
-              the closest points of pq and ab, kept when both lie inside their segments
+    ridge     t1 and t2 share an edge ab: n = +-(pq x ab), on the side of n1 + n2. The contact joins
+              the closest points of pq and ab; both must lie inside their segments
     face      otherwise: n leads from the middle of the inner piece of pq to the closest surface
-              point, and the contact lies at the mean of the ends of the piece, weighted by their
-              depths along n: at the deep one where the other is in the face
+              point. The contact lies at the mean of the ends of the piece, weighted by their
+              depths along n: at the deep end if the other one lies in the face
 
-The ridge is also left when it is more than twice as far from pq as the middle is from the surface:
-an edge that lies flush in a face would else be pushed out sideways through the other faces. In a
-sharp wedge the middle is closer by sin(half the dihedral angle) all the same. And it is left for
-the face when it would have overlapped more at the start of the step already: the lines have passed
-each other.
+The face also replaces a ridge that is more than twice as far from pq as the middle is from the
+surface: otherwise an edge flush in a face would be pushed out sideways through other faces. In a
+sharp wedge the middle is closer anyway, by sin(half the dihedral angle), which the test allows for.
+And the face replaces a ridge that would have overlapped more than it at the start of the step, if
+bodies were apart then: the lines have passed each other.
 
-With one end inside, the triangle closest to that end stands for t2, and only a ridge makes a
-contact: the vertex has one of its own, but where two rims cross it lies beside the overlap. It is
-dropped when it would have overlapped before: the edge touches a corner from the side.
+With one end inside, the triangle closest to that end stands for t2, or t1. Only a ridge makes a
+contact then: the vertex has one of its own, but where two rims cross that lies beside the overlap.
+It is dropped if it would have overlapped before: the edge touches a corner from the side.
 
-Whatever it is, a contact must push against a face of its edge (opposing.py).
+In any case a contact must push against a face of its edge (opposing.py).
 """
 
 import warp as wp
 
 from warp_contact.kernels.geometry import NONE, lines_closest, projected_weights
+from warp_contact.kernels.lengths import FLUSH_EDGE, STALE_OVERLAP
 from warp_contact.kernels.narrow_phase.opposing import edge_looks, opposes
 from warp_contact.kernels.narrow_phase.surface_query import (
     Crossing,
@@ -38,18 +39,16 @@ from warp_contact.kernels.narrow_phase.surface_query import (
     starts_inside,
     with_tri,
 )
-from warp_contact.kernels.narrow_phase.vertex_contact import STALE
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-# Of both skins: what is closer is taken to be among the candidates. Not sure where a list is about
-# to be found anew, for edges deeper than 0.02 of their length.
+# Of both skins: a closer triangle is taken to be among those of the pair. Just before pairs are
+# found again this may fail, for edges deeper than 0.02 of their length.
 SURE = wp.constant(0.125)
 SHARP = wp.constant(1.64)  # a ridge with a dihedral angle below 75 degrees is sharp
-TURNED = wp.constant(0.95)  # cosine: of two edges that are almost parallel, n turns in a step
-ASIDE = wp.constant(1.0)  # weights: so far from the closest point may the contact with a face lie
-FLAT = wp.constant(2.0e-4)  # of an edge: an edge this deep lies in the face, whatever its direction
+TURNED = wp.constant(0.95)  # cosine: the normal of two almost parallel edges turns in a step
+ASIDE = wp.constant(1.0)  # weights: how far from the closest point a contact with a face may lie
 
 
 @wp.func
@@ -77,15 +76,15 @@ class EdgeContact:
     w: wp.vec3  # their weights
     ridge: bool
     half: float  # sine of half the dihedral angle of the ridge
-    edge: int  # its own
-    body: int  # the other one
-    next: int  # place of another contact of the same two, -1 for none
+    edge: int  # pq itself
+    body: int  # N
+    next: int  # place of another contact of this edge and N, -1 for none
     kept: wp.vec4  # [N s] tangential and normal impulse so far
 
 
 @wp.func
 def is_same(a: EdgeContact, b: EdgeContact) -> bool:
-    """Whether two contacts of an edge with a body touch the same part of it, from one side."""
+    """Whether two contacts of an edge with a body touch the same part of it, on the same side."""
     if a.ridge != b.ridge or wp.dot(a.n, b.n) < TURNED:
         return False
     if a.ridge and a.vert[0] == b.vert[1]:
@@ -167,7 +166,7 @@ def start_gap(c: EdgeContact, i: int, j: int, x0: wp.array[wp.vec3]) -> float:
 
 @wp.func
 def crossing_of(
-    among: wp.vec2i,  # first and end of the triangles to look at
+    among: wp.vec2i,  # first and end of the triangles to test
     tri: wp.array[int],
     tris: wp.array[wp.vec3i],
     x: wp.array[wp.vec3],
@@ -194,8 +193,8 @@ def crossing_of(
 def closest_of(
     surface: wp.uint64,
     body: int,
-    sure: float,  # what is closer than this is among the triangles [m]
-    reach: float,  # where the search in the whole surface starts [m]
+    sure: float,  # a point closer than this is on one of the triangles [m]
+    reach: float,  # radius of the first query of the whole surface [m]
     among: wp.vec2i,
     tri: wp.array[int],
     tris: wp.array[wp.vec3i],
@@ -220,7 +219,7 @@ def crossing_contact(
     body: int,
     edge: float,  # mean edge of the body [m]
     apart: bool,  # bodies did not overlap when the step began
-    reach: float,  # of the candidates: both skins [m]
+    reach: float,  # of the pairs: both skins [m]
     among: wp.vec2i,  # first and end of its triangles that the edge may cross
     tri: wp.array[int],
     tris: wp.array[wp.vec3i],
@@ -242,16 +241,16 @@ def crossing_contact(
         middle = p + t * (q - p)
         hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, middle)
         if inner_side(hit, tris, x, middle) <= 0.0:
-            return out  # the line only brushes a rim
+            return out  # the line only grazes a rim
         contact = on_ridge(p, q, tris[enter.tri], tris[leave.tri], x)
         if contact.found and wp.min(SHARP * contact.half, 1.0) * contact.d <= 2.0 * hit.t:
-            if not apart or start_gap(contact, i, j, x0) > -STALE * edge:
+            if not apart or start_gap(contact, i, j, x0) > -STALE_OVERLAP * edge:
                 return contact
             face = on_face(p, q, enter.t, leave.t, hit, tris, x)
             if start_gap(face, i, j, x0) > start_gap(contact, i, j, x0):
                 return face
             return contact
-        if hit.t > FLAT * edge:
+        if hit.t > FLUSH_EDGE * edge:
             return on_face(p, q, enter.t, leave.t, hit, tris, x)
     elif enter.tri >= 0:
         hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, q)
@@ -261,7 +260,7 @@ def crossing_contact(
         hit = closest_of(surface, body, sure, 0.1 * edge, among, tri, tris, x, p)
         if hit.tri >= 0:
             out = on_ridge(p, q, tris[hit.tri], tris[leave.tri], x)
-    if apart and out.found and start_gap(out, i, j, x0) < -STALE * edge:
+    if apart and out.found and start_gap(out, i, j, x0) < -STALE_OVERLAP * edge:
         out.found = False
     return out
 
@@ -272,7 +271,7 @@ def edge_contact(
     body: int,
     edge: float,  # mean edge of the body [m]
     apart: bool,  # bodies did not overlap when the step began
-    reach: float,  # of the candidates: both skins [m]
+    reach: float,  # of the pairs: both skins [m]
     among: wp.vec2i,  # first and end of its triangles that the edge may cross
     tri: wp.array[int],
     tris: wp.array[wp.vec3i],

@@ -1,6 +1,6 @@
-"""Which surface edges cross another body, and their contacts.
+"""Stage 3, narrow phase: which surface edges cross another body, and their contacts.
 
-They are looked for where the impulses on the vertices lead.
+Edges are tested at the positions to which the impulses on the vertices lead.
 """
 
 import warp as wp
@@ -17,7 +17,7 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-AHEAD = wp.constant(16.0)  # looks: a distance that lasts so long need not be known any better
+AHEAD = wp.constant(16.0)  # detection passes: a larger clearance need not be known exactly
 
 
 @wp.func
@@ -30,7 +30,7 @@ def clearance(
     p: wp.vec3,
     q: wp.vec3,
 ) -> float:
-    """A distance [m] that pq keeps from all triangles, 0 where it may cross one."""
+    """Lower bound [m] on the distance of pq to all triangles; 0 where it may cross one."""
     out = float(NONE)
     for k in range(among[0], among[1]):
         gap = gap_to(p, q, tris[tri[k]], enough, x)
@@ -42,7 +42,7 @@ def clearance(
 
 @wp.func
 def is_among(found: EdgeContact, first: int, contact: wp.array[EdgeContact]) -> bool:
-    """Whether a list of contacts has the one that was found."""
+    """Whether the list of contacts that begins at ``first`` has the one that was found."""
     k = first
     while k >= 0:
         if is_same(found, contact[k]):
@@ -64,8 +64,8 @@ def find_crossings(
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
-    clear_until: wp.array[float],  # (capacity,) [m] travelled by both bodies: no crossing before
-    place: wp.array[int],  # (capacity,) that of the first in ``contact``, where there are any
+    clear_until: wp.array[float],  # (capacity,) [m] travelled by both, before any crossing
+    place: wp.array[int],  # (capacity,) of its first contact in ``contact``, -1 for none
     contact: wp.array[EdgeContact],  # (contacts,) in any order
     # out
     crossing: wp.array[int],  # (capacity + 1,) contacts of the edge with the body
@@ -73,9 +73,9 @@ def find_crossings(
     n_place: wp.array[int],  # (1,)
     n_new: wp.array[int],  # (1,) contacts found
 ):
-    """For each pair, and for the capacity behind them: a contact beside those it has.
+    """For each pair: find a contact beside those that it has; 0 contacts for the unused capacity.
 
-    Contacts that do not fit are left out; ``total_contacts`` counts them and asks for room.
+    Contacts that do not fit are left out; ``total_contacts`` counts them and asks for capacity.
     """
     for c in range(wp.tid(), crossing.shape[0], threads):
         crossing[c] = 0

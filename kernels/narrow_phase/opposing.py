@@ -1,11 +1,11 @@
 """By which faces of another body a vertex or an edge may leave it.
 
-Where two bodies touch, their surfaces look at each other. A face that looks the same way as the
-own ones is no way out, however close it is: the rims of two blocks that stand flush on each other
-lie in each other's side walls, and must not be pushed out through them.
+Where two bodies touch, their surfaces face each other. A face that points the same way as the
+faces of the vertex or edge is no way out, however close it is. Example: the rims of two blocks that
+stand flush on each other lie in each other's side walls, and must not be pushed out through them.
 
-    opposes    a face against which one of the own faces looks            n . n_own < -LEAN
-    along      a face that looks the way an own face does and opposes none  n . n_own > ALONG
+    opposes    the face points against an own face                      n . n_own < -LEAN
+    along      it points the way of an own face and opposes none        n . n_own > ALONG
 """
 
 import warp as wp
@@ -16,8 +16,8 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-LEAN = wp.constant(0.1)  # cosine: looking this much the other way is opposing
-ALONG = wp.constant(0.7)  # cosine: looking this much the same way is looking along
+LEAN = wp.constant(0.1)  # cosine: faces opposed by more than this oppose each other
+ALONG = wp.constant(0.7)  # cosine: faces aligned by more than this point the same way
 
 
 @wp.func
@@ -29,7 +29,7 @@ def looks(
     vs_tri: wp.array[int],
     x: wp.array[wp.vec3],
 ) -> wp.vec2:
-    """Least and largest n . n_own over the faces of vertex i; (-1, -1) inside its body."""
+    """Least and largest n . n_own over the faces of vertex i; (-1, -1) for an inner vertex."""
     out = wp.vec2(1.0, -1.0)
     for e in range(vs_start[i], vs_start[i + 1]):
         t = tris[vs_tri[e]]
@@ -50,7 +50,7 @@ def looks_against(
     vs_tri: wp.array[int],
     x: wp.array[wp.vec3],
 ) -> bool:
-    """Whether a face of normal n opposes one of vertex i; any does inside its body."""
+    """Whether a face of normal n opposes one of vertex i; always true for an inner vertex."""
     for e in range(vs_start[i], vs_start[i + 1]):
         t = tris[vs_tri[e]]
         a = area_vector(x[t[0]], x[t[1]], x[t[2]])
@@ -88,7 +88,7 @@ def closest_opposing(
     i: int,
     reach: float,  # [m]
 ) -> Hit:
-    """Closest point to vertex i on the faces that oppose it, not further than the reach."""
+    """Closest point to vertex i on the faces that oppose it, within the reach."""
     best = Hit()
     best.tri = -1
     best.t = reach

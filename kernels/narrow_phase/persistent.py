@@ -1,19 +1,19 @@
-"""Contacts of edges that go on from step to step.
+"""Persistent contacts of edges: those with an impulse in the last step start the next one.
 
-The impulses on the vertices alone would lead the edges between them across each other. Contacts of
-edges that are found only then begin without impulses in every step, and do not reach those that
-they need. So a contact of an edge that pressed in the last step is one of the next step from its
-start, with the same impulses, as long as the edges, or the edge and the triangle, lie next to each
-other. Where it presses no more, it is forgotten.
+Impulses on the vertices alone would lead the edges between them across each other. If contacts of
+edges were found only after these impulses, they would start without an impulse in every step, and
+end with too small ones. A contact of an edge that had an impulse in the last step is therefore a
+contact of the next step from its start, with the same impulse, as long as the edges, or the edge
+and the triangle, lie next to each other. A contact without an impulse is dropped.
 
-An edge may have several contacts with one body: they make a list, in the order of their places.
+An edge may have several contacts with one body: they form a list, in the order of their places.
 """
 
 import warp as wp
 
 from warp_contact.kernels.broad_phase.pairs import PairList
-from warp_contact.kernels.broad_phase.skins import LEAST
 from warp_contact.kernels.geometry import lines_closest, projected_weights
+from warp_contact.kernels.lengths import PERSISTENT
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact
 from warp_contact.kernels.narrow_phase.opposing import edge_looks, opposes
@@ -22,10 +22,7 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-LEVEL = wp.constant(0.5)  # cosine by which a contact may turn in a step
-# Of the shortest edge: what is further apart after a step was moved by the user, or has parted. The
-# margin of the broad phase is wider, so that whatever is closer is among its pairs.
-NEAR = wp.constant(0.5 * LEAST)
+MOST_TURN = wp.constant(0.5)  # cosine by which a contact may turn in a step
 
 
 @wp.func
@@ -36,7 +33,7 @@ def follow(
     tris: wp.array[wp.vec3i],
     x: wp.array[wp.vec3],
 ):
-    """A contact of the last step where its edge is now; not found when there is none any more."""
+    """A contact of the last step at the present positions; not found if it has ended."""
     p = x[e[0]]
     q = x[e[1]]
     a = x[c.vert[0]]
@@ -52,16 +49,16 @@ def follow(
         c.n = wp.normalize(wp.cross(q - p, b - a))
         if wp.dot(c.n, last) < 0.0:
             c.n = -c.n
-        if wp.dot(c.n, last) < LEVEL:
+        if wp.dot(c.n, last) < MOST_TURN:
             return c
         c.t = su[0]
         c.w = wp.vec3(1.0 - su[1], su[1], 0.0)
     else:
         c.n = face_normal(c.vert, x)
         c.w = projected_weights(p + c.t * (q - p), c.n, a, b, x[c.vert[2]])
-        if wp.dot(c.n, last) < LEVEL or wp.min(c.w) < 0.0:
+        if wp.dot(c.n, last) < MOST_TURN or wp.min(c.w) < 0.0:
             return c
-    apart = wp.dot(p + c.t * (q - p) - a, c.n)  # of the lines, or from the plane
+    apart = wp.dot(p + c.t * (q - p) - a, c.n)  # distance between the lines, or from the plane
     if wp.abs(apart) > near:
         return c
     c.found = opposes(edge_looks(tris[e[2]], tris[e[3]], c.n, x))
@@ -87,11 +84,11 @@ def continue_contacts(
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     # out
     crossing: wp.array[int],  # (capacity + 1,) contacts of the edge with the body, added to
-    place: wp.array[int],  # (capacity,) that of the first in ``contact``, where there are any
+    place: wp.array[int],  # (capacity,) of its first contact in ``contact``, -1 for none
     contact: wp.array[EdgeContact],  # (contacts,)
     n_place: wp.array[int],  # (1,)
 ):
-    """For each contact of the last step: a place for it and those of the same edge and body."""
+    """For each contact of the last step: keep it, with those of the same edge and body."""
     if wp.tid() == 0:
         n_place[0] = n_before[0]
     for first in range(wp.tid(), n_before[0], threads):
@@ -104,13 +101,13 @@ def continue_contacts(
         while c < end and pairs.pair[c][1] != body:
             c += 1
         if c >= end:
-            continue  # too far from each other
+            continue  # no pair any more: too far apart
         last = int(-1)
         k = first
         while is_like(k, first, n_before[0], before):
             now = before[k]
             if now.kept[3] > 0.0:
-                now = follow(now, NEAR * mesh.edge, mesh.edges[e], mesh.tris, x0)
+                now = follow(now, PERSISTENT * mesh.edge, mesh.edges[e], mesh.tris, x0)
                 if now.found:
                     contact[k] = now
                     crossing[c] = crossing[c] + 1

@@ -1,14 +1,14 @@
-"""Questions to the surface of one body, answered through the triangle Bvh from its group's root.
+"""Queries on the surface of one body, through the triangle Bvh from the root of its group.
 
     first_hit      the first crossing of a segment that enters (or leaves) the body
-    first_crossing both
+    first_crossing the first crossing that enters, and the first after it that leaves
     leaving_hit    where a ray from inside leaves the body
     closest_hit    the closest point of the surface
-    corner_normals outward normals of a triangle: of the face, blended over smooth edges only
+    corner_normals outward normals of a triangle, averaged over smooth edges only
 
 A hit is (triangle, distance along the query, weights of its corners); triangle -1 means none.
-Normals blended over the rim of a box push sideways and inject energy, so a neighbouring triangle
-joins the blend only when it is within the crease angle.
+Normals averaged over the rim of a box push sideways and inject energy. Therefore a neighbouring
+triangle joins the average only when it is within the crease angle.
 """
 
 import warp as wp
@@ -24,7 +24,9 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-OBLIQUE = wp.constant(0.1)  # cosine: a ray along a wall in which it starts does not leave by it
+OBLIQUE = wp.constant(
+    0.1
+)  # cosine: a ray that runs along the wall where it starts leaves elsewhere
 CREASE = wp.constant(0.6)  # cosine: edges sharper than 53 degrees keep their face normals
 
 
@@ -69,7 +71,7 @@ def first_hit(
         n = wp.cross(b - a, c - a)
         slope = wp.dot(u, n)
         height = wp.dot(p - a, n)
-        # On the side asked for, and with the end not before the plane.
+        # Crossed in the given direction, and the end is not in front of the plane.
         if side * slope > 0.0 and side * (height + slope) >= 0.0:
             h = segment_hit(p, u, a, b, c, grazing)
             if h[0] > after and h[0] <= 1.0:
@@ -100,7 +102,7 @@ def no_crossing() -> Crossing:
 def with_tri(
     found: Crossing, t: int, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3], p: wp.vec3, u: wp.vec3
 ) -> Crossing:
-    """The first crossings when triangle t is looked at too."""
+    """The first crossings, with triangle t included."""
     out = found
     a = x[tris[t][0]]
     b = x[tris[t][1]]
@@ -121,7 +123,7 @@ def with_tri(
 
 @wp.func
 def starts_inside(found: Crossing) -> bool:
-    """Whether the segment leaves before it enters: the first leaving crossing is not the one."""
+    """Whether the segment leaves before it enters: that leaving crossing is of another piece."""
     return found.enter.tri >= 0 and found.leave.tri >= 0 and found.leave.t < found.enter.t
 
 
@@ -177,7 +179,7 @@ def leaving_hit(
 
 @wp.func
 def closer(best: Hit, t: int, tris: wp.array[wp.vec3i], x: wp.array[wp.vec3], p: wp.vec3) -> Hit:
-    """The closest point to p when triangle t is looked at too."""
+    """The closest point to p, with triangle t included."""
     out = best
     a = x[tris[t][0]]
     b = x[tris[t][1]]
@@ -198,7 +200,7 @@ def closest_hit(
     tris: wp.array[wp.vec3i],
     x: wp.array[wp.vec3],
     p: wp.vec3,
-    reach: float,  # where the search starts; doubled until it suffices [m]
+    reach: float,  # radius of the first query; doubled until it suffices [m]
 ) -> Hit:
     """Closest point of the body's surface; none only if it is a million reaches away."""
     best = Hit()
@@ -247,7 +249,7 @@ def corner_normals(
 ) -> wp.mat33:
     """Outward unit normals at the corners of a triangle, as columns.
 
-    That at a hit is the sum of them by its weights, normalised.
+    The normal at a hit is their sum by its weights, normalised.
     """
     face = area_vector(x[t[0]], x[t[1]], x[t[2]])
     return wp.matrix_from_cols(

@@ -1,24 +1,25 @@
-"""The contact of each vertex inside a body with a triangle, or with a plane.
+"""Stage 4, depth: the contact of each vertex inside a body with a triangle, or with a plane.
 
 The contact point is where the ray from the vertex along its direction leaves the body (Spillmann &
-Teschner 2005, section 3.2), and the way to there replaces the depth. Where no direction is known,
-or the ray would leave much deeper than the depth tells, the closest point of the surface serves
-instead. So it does where the contact would have overlapped at the start of the step already, and
-the closest point's less: the vertex came in by another side. Where that would have overlapped too,
-close to a rim, it is led back through the triangle by which it came in.
+Teschner 2005, section 3.2). The distance to it replaces the depth. In two cases the closest point
+of the surface serves instead. Either there is no direction, or the ray is much longer than the
+depth. Or bodies were apart when the step began, but the contact would have overlapped then, and
+that of the closest point less: the vertex came in by another side. If the latter would have
+overlapped too, close to a rim, the vertex goes back through the triangle by which it came in.
 
-A vertex in the speculative margin, outside, makes a contact with a gap. The impulses then know of
-it before it closes: what rests stays in contact in every step, and its force does not come in
-blows.
+A vertex outside, in the speculative margin, makes a contact with a gap. The impulses then see it
+before it closes, so that a resting body stays in contact in every step and its contact force is
+steady.
 
-Triangle and direction are those at the predicted positions, the weights those at the start of the
-step x0, seen along the direction: sum a_k x0_k is then parallel to the normal impulse and angular
-momentum is kept, since L = sum m x0 x v for symplectic Euler.
+Triangle and direction are those at the predicted positions. The weights are those at the start of
+the step x0, seen along the direction: sum a_k x0_k is then parallel to the normal impulse, which
+keeps the angular momentum, since L = sum m x0 x v for symplectic Euler.
 """
 
 import warp as wp
 
 from warp_contact.kernels.geometry import projected_weights
+from warp_contact.kernels.lengths import FLUSH, NEAR_WALL, STALE_OVERLAP, VERTEX_MARGIN
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.opposing import along, closest_opposing, looks
@@ -30,20 +31,15 @@ from warp_contact.kernels.narrow_phase.surface_query import (
     inner_side,
     leaving_hit,
 )
-from warp_contact.kernels.narrow_phase.vertices import MARGIN, Penetration
+from warp_contact.kernels.narrow_phase.vertices import Penetration
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-SLIP = wp.constant(1.0)  # change of the weights in a step above which they are taken at its end
-STALE = wp.constant(
-    2.0e-3
-)  # of an edge: overlap at the start of a step that tells a wrong direction
-NEAR = wp.constant(0.05)  # of an edge: a vertex this close to a wall may lie in it
-FLUSH = wp.constant(1.0e-5)  # of an edge: a vertex this deep lies in the surface
-BESIDE = wp.constant(0.1)  # weights: where a ray from inside the body leaves far from that outside
-FAR = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
-ASTRAY = wp.constant(2.0)  # nor a way back this many times longer than that of the step
+SLIP = wp.constant(1.0)  # change of the weights in a step, above which those at its end are used
+BESIDE = wp.constant(0.1)  # weights: further away, a ray from inside is none of the vertex outside
+TRUSTED = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
+ASTRAY = wp.constant(2.0)  # nor a way back this many times longer than the motion in the step
 
 
 @wp.struct
@@ -58,7 +54,7 @@ class VertexContact:
 def contact_at(
     hit: Hit, i: int, n: wp.vec3, tris: wp.array[wp.vec3i], x0: wp.array[wp.vec3]
 ) -> VertexContact:
-    """The contact of vertex i with a hit, along n."""
+    """The contact of vertex i with the point of a hit, along n."""
     out = VertexContact()
     out.found = True
     out.hit = hit
@@ -80,14 +76,16 @@ def inner_contact(
     r: wp.vec3,
     edge: float,  # [m]
 ) -> VertexContact:
-    """Where the ray of vertex i along its direction leaves the body."""
+    """The contact where the ray of vertex i along its direction leaves the body."""
     out = VertexContact()
     if layer < 0 or depth <= 0.0:
         return out
     ray = leaving_hit(surface, root, tris, x, x[i], r)
-    if ray.tri < 0:  # in the margin, beside the body: from just inside it
+    if ray.tri < 0:  # in the margin, outside the body: cast it from just inside
         near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
-        inner = hit_point(near, tris, x) - 2.0 * MARGIN * edge * face_normal(tris[near.tri], x)
+        inner = hit_point(near, tris, x) - 2.0 * VERTEX_MARGIN * edge * face_normal(
+            tris[near.tri], x
+        )
         ray = leaving_hit(surface, root, tris, x, inner, r)
         if ray.tri >= 0:
             ray.t = wp.dot(hit_point(ray, tris, x) - x[i], r)
@@ -95,7 +93,7 @@ def inner_contact(
             own = projected_weights(x[i], r, x[t[0]], x[t[1]], x[t[2]])
             if wp.length(own - ray.w) > BESIDE:
                 return out
-    if ray.tri >= 0 and ray.t > 0.0 and ray.t <= FAR * depth + NEAR * edge:
+    if ray.tri >= 0 and ray.t > 0.0 and ray.t <= TRUSTED * depth + NEAR_WALL * edge:
         out = contact_at(ray, i, r, tris, x0)
     return out
 
@@ -117,11 +115,13 @@ def closest_contact(
     near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
     inside = inner_side(near, tris, x, x[i])
     if inside <= FLUSH * edge:
-        near = closest_opposing(surface, root, tris, vs_start, vs_tri, x, i, 2.0 * MARGIN * edge)
+        near = closest_opposing(
+            surface, root, tris, vs_start, vs_tri, x, i, 2.0 * VERTEX_MARGIN * edge
+        )
     if near.tri < 0:
         return out
     n = face_normal(tris[near.tri], x)
-    if near.t < NEAR * edge and along(looks(i, n, tris, vs_start, vs_tri, x)):
+    if near.t < NEAR_WALL * edge and along(looks(i, n, tris, vs_start, vs_tri, x)):
         return out
     gap = hit_point(near, tris, x) - x[i]
     if wp.dot(gap, n) > 0.0:
@@ -141,7 +141,7 @@ def entry_contact(
 ) -> VertexContact:
     """The contact of vertex i with the triangle by which it came in since the step began.
 
-    The way is measured against the closest point of the surface, as the body may move too.
+    The motion is relative to the closest point of the surface, as the body may move too.
     """
     out = VertexContact()
     near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
@@ -167,7 +167,7 @@ def found_contact(
     """The contact of a penetration with a triangle, if there is any."""
     i = e.vert
     edge = mesh.body_edge[e.body]
-    stale = -STALE * edge
+    stale = -STALE_OVERLAP * edge
     root = wp.bvh_get_group_root(mesh.bvh, e.body)
     out = inner_contact(mesh.bvh, root, mesh.tris, x0, x, i, e.layer, e.depth, e.direction, edge)
     if not out.found or (apart and out.start < stale):

@@ -1,8 +1,8 @@
-"""Which vertices lie inside a body or below a plane: the penetrations of a step.
+"""Stage 3, narrow phase: the penetrations of a step, vertices inside a body or below a plane.
 
-A vertex within the speculative margin of a body, MARGIN of an edge, counts as one, too. Rims that
-lie flush in a wall would else be inside or outside by rounding, and a contact at rest would be lost
-and found in turns.
+A vertex outside but within the speculative margin of a body, VERTEX_MARGIN of an edge, counts too.
+Otherwise rounding would decide whether a rim that lies flush in a wall is inside, and a resting
+contact would be lost and found again and again.
 
 Penetrations keep the order of their pairs: by vertex, then by body, planes last.
 """
@@ -12,17 +12,16 @@ import warp as wp
 from warp_contact.kernels.broad_phase.pairs import PairList
 from warp_contact.kernels.broad_phase.skins import CAREFUL
 from warp_contact.kernels.geometry import NONE, tet_weights, triangle_closest
+from warp_contact.kernels.lengths import VERTEX_MARGIN
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-MARGIN = wp.constant(1.0e-3)  # of an edge: a vertex this close is looked at like one inside
-
 
 @wp.func
 def distance(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3) -> float:
-    """A distance [m] that x keeps from the planes of a tet's faces, 0 from one that is inverted."""
+    """Distance [m] of x to a tet by the planes of its faces, or less; 0 for an inverted one."""
     n1 = wp.cross(b - a, d - a)
     n2 = wp.cross(d - a, c - a)
     n3 = wp.cross(c - a, b - a)
@@ -60,7 +59,7 @@ def clearance(
     tets: wp.array[wp.vec4i],
     y: wp.array[wp.vec3],
 ) -> float:
-    """A distance [m] that x keeps from the margins of all tets, not above 0 where it is in one."""
+    """Lower bound [m] on the distance of x to the margins of all tets; 0 if it is in one."""
     out = float(NONE)
     for k in range(among[0], among[1]):
         t = tets[tet[k]]
@@ -95,11 +94,11 @@ def find_penetrations(
     travelled: wp.array[float],  # (n_body + n_plane,) [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
-    clear_until: wp.array[float],  # (capacity,) [m] travelled by both bodies: no penetration before
+    clear_until: wp.array[float],  # (capacity,) [m] travelled by both, before any penetration
     # out
     is_inside: wp.array[int],  # (capacity + 1,) 1 for a penetration, 0 for all others
 ):
-    """For each pair, and for the capacity behind them."""
+    """For each pair: whether its vertex penetrates; 0 for the unused capacity."""
     for c in range(wp.tid(), is_inside.shape[0], threads):
         is_inside[c] = 0
         if c >= pairs.n[0]:
@@ -117,7 +116,7 @@ def find_penetrations(
             clear = wp.dot(mesh.plane_n[p], x[i]) - mesh.plane_h[p]
             inside = clear < 0.0
         else:
-            margin = MARGIN * mesh.body_edge[body]
+            margin = VERTEX_MARGIN * mesh.body_edge[body]
             clear = clearance(x[i], margin, pairs.items[c], pairs.item, mesh.tets, x)
             inside = clear <= 0.0
         if inside:
@@ -138,7 +137,7 @@ def list_penetrations(
     layer: wp.array[int],  # (1,) 0
     pending: wp.array[int],  # (1,) 0
 ):
-    """For each pair; the first thread sets what their depths begin with."""
+    """For each pair: list its penetration. The first thread resets the layers of depth."""
     if wp.tid() == 0:
         layer[0] = 0
         pending[0] = 0

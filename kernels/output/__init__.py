@@ -1,1 +1,1 @@
-"""What is measured and drawn, outside of the step."""
+"""Measurements and pictures, outside of the step."""

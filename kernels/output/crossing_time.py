@@ -6,7 +6,7 @@ of the triangle where
 
     f(s) = u(s) . (v(s) x w(s)) = 0,   0 <= s <= 1      [m^3], a cubic (Provot 1997)
 
-It goes in where f falls and out where f rises.
+It enters where f falls and leaves where f rises.
 """
 
 import warp as wp
@@ -33,7 +33,7 @@ class Relative:
 
 @wp.func
 def between(a: wp.vec3, b: wp.vec3, s: float) -> wp.vec3:
-    return (1.0 - s) * a + s * b  # exact at both ends: the next look starts where this one ended
+    return (1.0 - s) * a + s * b  # exact at both ends: the next call starts where this one ended
 
 
 @wp.func
@@ -45,7 +45,7 @@ def height(r: Relative, s: float) -> float:
 
 @wp.func
 def turning(r: Relative) -> wp.vec2:
-    """Where f turns, in ascending order; 0 or 1 for what is not within (0, 1)."""
+    """Extrema of f in ascending order; 0 or 1 for one outside (0, 1)."""
     du = r.u1 - r.u0
     dv = r.v1 - r.v0
     dw = r.w1 - r.w0
@@ -72,7 +72,7 @@ def turning(r: Relative) -> wp.vec2:
 
 @wp.func
 def within(r: Relative, s: float) -> bool:
-    """Whether the point's foot is in the triangle."""
+    """Whether the point projects into the triangle."""
     u = between(r.u0, r.u1, s)
     v = between(r.v0, r.v1, s)
     w = between(r.w0, r.w1, s)
@@ -86,7 +86,7 @@ def within(r: Relative, s: float) -> bool:
 
 @wp.func
 def crossing_time(r: Relative, low: float, high: float) -> float:
-    """When the point crosses the triangle while f rises or falls; NONE if it does not."""
+    """When the point crosses the triangle where f is monotonic; NONE if it does not."""
     outside = height(r, low) >= 0.0
     if outside == (height(r, high) >= 0.0):
         return NONE

@@ -1,7 +1,7 @@
-"""What is left of an overlap, found without the hash and the depths of the step.
+"""Overlaps that are left, found without the hash and the depths of the step.
 
-A vertex overlaps by its distance to the surface of the body whose tets hold it, an edge with both
-ends outside by the distance of the middle of its inner piece to that surface.
+A vertex overlaps by its distance to the surface of the body whose tets contain it. An edge with
+both ends outside overlaps by the distance of the middle of its inner piece to that surface.
 """
 
 import warp as wp

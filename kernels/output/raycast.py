@@ -5,8 +5,8 @@
     A: share of the sky that is visible                   cosine-weighted rays; what hides it glows
     s: highlight of a rough coat (Blinn 1977)
 
-The origin of the secondary rays is moved off the facet onto a curved surface through the vertex
-normals (Hanika 2021, Hacking the shadow terminator), or a coarse mesh shows its facets as shadows.
+Secondary rays start on a curved surface through the vertex normals, not on the facet (Hanika 2021,
+Hacking the shadow terminator). Otherwise shadows would show the facets of a coarse mesh.
 """
 
 import warp as wp

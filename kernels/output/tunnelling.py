@@ -1,15 +1,17 @@
-"""What went through a surface between two looks at the scene.
+"""Tunnelling: which points went through a body or a plane from one state to the next.
 
-A point and the triangles of a body move straight from one look to the next; crossing_time.py says
-when they meet. What goes in by a face and out by one that looks the other way went through; out by
-the same face, or round a corner, it did not. It has to be deeper than ``DEEP`` of the body's
-thickness on its way: a vertex that grazes a base from rim to rim does not go through the body.
+A point and the triangles of a body move straight from one state to the next; crossing_time.py says
+when they meet. A point went through if it entered by one face and left by one that faces the other
+way. If it left by the same face, or round a corner, it did not. On its way it must also have been
+deeper than ``DEEP`` of the thickness of the body: a vertex that grazes a base from rim to rim does
+not go through the body.
 """
 
 import warp as wp
 
-from warp_contact.kernels.broad_phase.bounds import GROW, next_in
+from warp_contact.kernels.broad_phase.bounds import next_in
 from warp_contact.kernels.geometry import NONE, triangle_closest
+from warp_contact.kernels.lengths import BOX_GROWTH
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.surface_query import face_normal
 from warp_contact.kernels.options import OPTIONS
@@ -23,13 +25,13 @@ from warp_contact.kernels.output.crossing_time import (
 
 wp.set_module_options(OPTIONS)
 
-OPPOSED = wp.constant(-0.5)  # cosine between two faces that look away from each other
+OPPOSED = wp.constant(-0.5)  # cosine between two faces that face away from each other
 DEEP = wp.constant(0.1)  # of the thickness of a body
 
 
 @wp.struct
 class Trip:
-    """Times and triangles of the first way in, the last way in and the last way out; -1: none."""
+    """Times and triangles of the first entry, the last entry and the last exit; -1: none."""
 
     came: float
     came_tri: int
@@ -78,7 +80,7 @@ def trip_through(
     p0: wp.vec3,
     p1: wp.vec3,
 ) -> Trip:
-    """What a point does at the surface of a body on its way from p0 to p1."""
+    """The crossings of a point with the surface of a body, from p0 to p1."""
     trip = no_trip()
     t = int(0)
     root = wp.bvh_get_group_root(surface, body)
@@ -118,7 +120,7 @@ def is_deep(
     s: float,
     reach: float,  # [m]
 ) -> bool:
-    """Whether no triangle of the body is as close to p at s as the reach."""
+    """Whether all triangles of the body are further from p than the reach, at time s."""
     deep = bool(True)
     t = int(0)
     grow = wp.vec3(reach, reach, reach)
@@ -151,10 +153,10 @@ def triangle_paths(
     lower: wp.array[wp.vec3],  # (n_tri,) [m]
     upper: wp.array[wp.vec3],  # (n_tri,) [m]
 ):
-    """One thread per triangle: the box of its way."""
+    """One thread per triangle: the box of its path."""
     k = wp.tid()
     t = tris[k]
-    g = GROW * body_edge[tri_body[k]]
+    g = BOX_GROWTH * body_edge[tri_body[k]]
     lo = wp.min(x0[t[0]], x1[t[0]])
     hi = wp.max(x0[t[0]], x1[t[0]])
     for c in range(1, 3):
@@ -167,8 +169,8 @@ def triangle_paths(
 @wp.kernel
 def follow_points(
     # in
-    bodies: wp.uint64,  # Bvh over the ways of the bodies, grouped by world
-    mesh: Mesh,  # its Bvh over the ways of the triangles
+    bodies: wp.uint64,  # Bvh over the paths of the bodies, grouped by world
+    mesh: Mesh,  # its Bvh is over the paths of the triangles
     ends: wp.array[wp.vec2i],  # (n_point,) a point is in the middle between two vertices
     body_world: wp.array[int],  # (n_body,)
     body_thickness: wp.array[float],  # (n_body,) [m]

@@ -1,30 +1,30 @@
-"""Stage 4, the end: every colliding vertex into the plane of its triangle.
+"""Stage 8, closure: put every vertex that overlaps into the plane of its triangle.
 
-The impulses once more, on positions instead of velocities and with gaps as targets.
+The iteration of the impulses, on positions instead of velocities and with gaps as targets.
 With W of constraint.py,
 
     p <- max(0, p - (g + slack) / W),   x_k += a_k dp n / m_k
 
 The mobility is 1 / m, so the centre of mass of a contact stays where it is. Eq. (1) alone leaves
-25 to 38 % of an overlap between a vertex and the middle of a triangle. An overlap that was there
-when the step began is left to the search, which knows better than the masses who should yield; in a
-step without one it is looked at again first.
+25 to 38 % of an overlap between a vertex and the middle of a triangle. An overlap older than the
+step is left to the search, which balances pressures, not masses. In a step without search it waits
+for a second detection pass, which may find a better plane.
 
-A move p n of a pair that slides by u_t changes the angular momentum by p n x u_t. It is handed back
-to the velocities as the torque of tangent.py, dv_k = (b_k . p u_t) n / m_k.
+A move p n of a contact that slides by u_t changes the angular momentum by p n x u_t. The velocities
+get it back as the torque of tangent.py, dv_k = (b_k . p u_t) n / m_k.
 
-slack is what exceeds the largest move of a step, less the resting gap of the impulses: a body that
-starts deep inside another would be inverted by a full correction. Contacts without an overlap are
-only kept from getting one.
+slack is the overlap beyond the largest move of a step, less the resting gap of the impulses: a full
+correction would invert a body that starts deep inside another. Contacts without an overlap are only
+kept from getting one.
 """
 
 import warp as wp
 
 from warp_contact.kernels.geometry import NONE
 from warp_contact.kernels.impulse.constraint import Constraint
-from warp_contact.kernels.narrow_phase.contact import REST, Contact, gap, relative_velocity
+from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, REST_GAP
+from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.surface.residual import TOLERANCE
 
 wp.set_module_options(OPTIONS)
 
@@ -46,12 +46,12 @@ def begin_closure(
     slack: wp.array[float],  # (capacity,) [m]
     push: wp.array[float],  # (capacity,) [kg m]
 ):
-    """For each contact: what stays for later steps."""
+    """For each contact: the overlap that is left to later steps."""
     for c in range(wp.tid(), n_contact[0], threads):
         edge = contact[c].edge
         slack[c] = 0.0
         if residual[c] > 0.0:
-            slack[c] = wp.max(residual[c] - bound * edge, 0.0) - REST * edge
+            slack[c] = wp.max(residual[c] - bound * edge, 0.0) - REST_GAP * edge
         if -constraint[c].gap_bound * dt[0] > deep * edge:
             slack[c] = NONE
         push[c] = 0.0
@@ -72,7 +72,7 @@ def solve_gaps(
     # out
     part: wp.array[wp.vec3],  # (5 capacity,) [kg m] what it moves at each vertex
     # out, added to
-    again: wp.array[int],  # (1,) 1 when a gap is still open
+    again: wp.array[int],  # (1,) 1 when an overlap is left
 ):
     """For each contact: what this pass adds to its push."""
     for c in range(wp.tid(), n_contact[0], threads):
@@ -81,7 +81,7 @@ def solve_gaps(
         w = constraint[c].inv_mass
         if w > 0.0:
             g = gap(at, x) + slack[c]
-            if g < -TOLERANCE * at.edge and done[0] < PASSES:
+            if g < -CLOSURE_TOLERANCE * at.edge and done[0] < PASSES:
                 again[0] = 1
             p = wp.max(push[c] - g / w, 0.0)
         for k in range(5):
@@ -101,7 +101,7 @@ def torques(
     # out
     part: wp.array[wp.vec3],  # (5 capacity,) [kg m/s] what it hands back at each vertex
 ):
-    """For each contact: the torque that its push leaves behind."""
+    """For each contact: the torque that makes up for its push."""
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
         u = wp.vec3(0.0, 0.0, 0.0)

@@ -1,8 +1,8 @@
-"""Stage 3: the deformation region, and where each of its vertices would go to resolve its overlap.
+"""Stage 6, region: the deformation region, and where its vertices would go to resolve overlaps.
 
 Displacement vector of a vertex, eq. (1) of Spillmann & Teschner 2005. Its own penetration vector d
-points out of the other body; the vectors d_i of the vertices whose contact triangle it belongs to
-push it the other way, hence the minus sign (as printed the two would cancel):
+points out of the other body. The vertices whose contact triangle it belongs to have vectors d_i
+that push it the other way, hence the minus sign. With the plus sign as printed they would cancel:
 
     s = (d - sum w_i d_i) / (sum w_i + 1)                                               [m]
 """
@@ -27,7 +27,7 @@ def displacement_vectors(
     # out
     s: wp.array[wp.vec3],  # (n_vert,) [m], zero outside the region
 ):
-    """One thread per vertex: eq. (1); an edge's end counts with its weight on the edge."""
+    """One thread per vertex: eq. (1); the end of an edge counts with its weight on the edge."""
     i = wp.tid()
     s[i] = wp.vec3(0.0, 0.0, 0.0)
     if mobility_of(i, bodies) == 0.0:
@@ -60,7 +60,7 @@ def touching_tets(
     # out
     mask: wp.array[int],  # (n_tet,) 1 for a tet with a displacement vertex
 ):
-    """One thread per tet: only these see their forces change during the search."""
+    """One thread per tet: whether its forces change during the search."""
     q = wp.tid()
     mask[q] = 0
     for k in range(4):

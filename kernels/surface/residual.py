@@ -1,27 +1,25 @@
-"""What the impulses leave: overlaps, and vertices that left their triangle or lie below it.
+"""Residual overlaps after the impulses, and vertices that left their triangle or lie below it.
 
-The gap of a vertex is that to a point of its triangle, along a direction that may not be its
-normal: once the vertex has slid, it may overlap this or another triangle all the same.
+The gap of a vertex is that to a point of its triangle, along a direction that may not be the normal
+of the triangle. A vertex that has slid may therefore overlap this or another triangle although its
+gap is closed.
 """
 
 import warp as wp
 
 from warp_contact.kernels.geometry import projected_weights
 from warp_contact.kernels.impulse.constraint import Constraint
+from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, OLD_OVERLAP
 from warp_contact.kernels.narrow_phase.contact import Contact, gap
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-TOLERANCE = wp.constant(1.0e-4)  # of an edge: less overlap is left to the resting gap
-DEEP = wp.constant(
-    1.0e-3
-)  # of an edge below the resting gap, at the start of a step: worth a search
 STRAY = wp.constant(1.0e-3)  # barycentric weight below which a vertex has left its triangle
 
 # Places in ``found``.
 OPEN = wp.constant(0)  # some overlap is to be closed
-OLD = wp.constant(1)  # some overlap is to be searched: no step created it
+OLD = wp.constant(1)  # some overlap is for the search: it is older than the step
 WAS_OLD = wp.constant(2)  # there was one since the frame began
 
 
@@ -37,7 +35,7 @@ def residual_gaps(
     # out
     residual: wp.array[float],  # (capacity,) [m], 0 up to the tolerance
     # out, added to
-    found: wp.array[int],  # (3,) 1 for each that is so
+    found: wp.array[int],  # (3,) 1 where it is true
 ):
     """For each contact: its overlap at x."""
     for c in range(wp.tid(), n_contact[0], threads):
@@ -47,10 +45,10 @@ def residual_gaps(
             continue
         d = -gap(at, x)
         edge = at.edge
-        if d > TOLERANCE * edge:
+        if d > CLOSURE_TOLERANCE * edge:
             residual[c] = d
             found[OPEN] = 1
-        if d > DEEP * edge and -constraint[c].gap_bound * dt[0] > DEEP * edge:
+        if d > OLD_OVERLAP * edge and -constraint[c].gap_bound * dt[0] > OLD_OVERLAP * edge:
             found[OLD] = 1
             found[WAS_OLD] = 1
 
@@ -78,6 +76,6 @@ def find_strays(
         t2 = x[at.vert[4]]
         face = wp.normalize(wp.cross(t1 - t0, t2 - t0))
         w = projected_weights(p, at.normal, t0, t1, t2)
-        below = wp.dot(p - t0, face) < -TOLERANCE * at.edge
+        below = wp.dot(p - t0, face) < -CLOSURE_TOLERANCE * at.edge
         if wp.min(w) < -STRAY or below:
             found[OPEN] = 1

@@ -1,26 +1,26 @@
-"""Stage 4: the contact surface, where the pressures of the two sides balance.
+"""Stage 7, search: the contact surface, where the pressures of the two sides balance.
 
-A displacement vertex moves to x = x0 + a s, a in [0, 1]. Its traction is measured against s on its
+A vertex of the region moves to x = x0 + a s, a in [0, 1]. Its traction is measured against s on its
 own share of the surface, seen along s:
 
     tau = -F(x) . s^ / (A / 3),   A = sum of max(0, -n_t . s^) area_t over its triangles     [Pa]
 
 (a nodal force carries a third of its triangles). The other side's traction is interpolated with
 the weights of eqs. (1) and (2): P_other = sum w_i tau_i / sum w_i over the vertices that touch
-this vertex's triangles, blended into sum b_j tau_j over its own contact triangle where there are
-few. A trial half way gives each side its stiffness, k = 2 (P(1/2) - P(0)), and
+this vertex's triangles. Where there are few, sum b_j tau_j over its own contact triangle is blended
+in. A trial half way gives each side its stiffness, k = 2 (P(1/2) - P(0)). Then
 
     balanced   a = (k_other + c (P_other - P_own)) / (k_own + k_other)   with the pressures at x0
                a <- a + c (P_other - P_own) / (k_own + k_other)          with those at a
 
-Both sides do so and meet in the middle, a <- (a + 1 - b) / 2, so that no gap and no overlap comes
-from their disagreement. k is the stiffness of a side that moves as a whole; one vertex against its
-neighbours is several times stiffer, so only the part c of an imbalance is corrected at a time.
+Both sides do so. With b the fraction of the other side they meet, a <- (a + 1 - b) / 2, so that
+their disagreement leaves no gap or overlap. k is the stiffness of a side that moves as a whole. One
+vertex alone is several times stiffer, so only the part c of an imbalance is corrected at a time.
 
     literal    P_own = f / A, P_other = sum w_i f_i / (A sum w_i) with f = -F . s^ (eq. 2 as
                printed: A is the same on both sides of the comparison and falls out of it), and
-               a <- a +- 2^-(k + 2), k = 0, 1, ...: bisection after the first half; P_other with
-               the own triangle blended in as above, pulling forces count as none
+               a <- a +- 2^-(k + 2), k = 0, 1, ...: bisection from 1/2 on. P_other has the own
+               triangle blended in as above, and pulling forces count as zero
 
 A side whose vertices are all fixed is rigid: the other side goes all the way.
 """
@@ -36,7 +36,7 @@ from warp_contact.kernels.options import OPTIONS
 wp.set_module_options(OPTIONS)
 
 FEW = wp.constant(0.05)  # weight of touching vertices that counts as much as the own triangle
-CAUTION = wp.constant(0.25)  # c above; 1 makes neighbours take turns at 0 and 1
+CAUTION = wp.constant(0.25)  # c above; with 1, neighbours alternate between 0 and 1
 RIGID = wp.constant(-1.0)  # stands for the fraction of a rigid side
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_contact.scene.materials import EDGES, FACES, SpringNetwork
+from warp_contact.scene.materials import EDGES, OPPOSITE, SpringNetwork
 from warp_contact.step import forces
 
 RHO = 1000.0  # [kg/m^3]
@@ -22,7 +22,7 @@ def once(tets: np.ndarray, parts: tuple, most: int = 99) -> np.ndarray:
 def measures(x: np.ndarray, tets: np.ndarray) -> list[np.ndarray]:
     """Edge lengths, areas of surface triangles, signed volumes."""
     p, q = np.moveaxis(x[once(tets, EDGES)], 1, 0)
-    a, b, c = np.moveaxis(x[once(tets, FACES, 1)], 1, 0)
+    a, b, c = np.moveaxis(x[once(tets, OPPOSITE, 1)], 1, 0)
     corner = x[tets]
     return [
         np.linalg.norm(q - p, axis=1),

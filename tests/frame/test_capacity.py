@@ -1,15 +1,19 @@
-"""capacity.py: buffers that a frame outgrew, and those that it would soon have outgrown."""
+"""capacity.py: buffers that a frame outgrew, or would soon have outgrown; nothing is lost."""
 
-from dataclasses import astuple
+from dataclasses import astuple, fields, replace
 
 import numpy as np
+import pytest
 
 from warp_contact import NeoHookean, Scene, Simulation, box
-from warp_contact.data.contacts import Capacity
+from warp_contact.data import warm_start
+from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import allocate_work
 from warp_contact.frame import capacity
+from warp_contact.step import broad_phase, narrow_phase
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
+LISTS = ["verts", "tets", "edges", "tris", "near"]
 
 
 def stacked(device) -> Simulation:
@@ -30,23 +34,24 @@ def test_what_fits_stays(device):
 def test_what_is_more_than_half_full_grows_with_what_did_not_fit(device):
     sim = stacked(device)
     work = sim._stepper.work
+    broad = work.broad_phase
     used = [
         work.contacts.n.numpy()[0],
-        (work.pair_key.numpy() >= 0).sum(),
-        work.candidates.verts.n.numpy()[0],
-        work.candidates.verts.item_start.numpy()[-1],
-        work.candidates.edges.n.numpy()[0],
-        work.candidates.edges.item_start.numpy()[-1],
+        (work.forces.pair_key.numpy() >= 0).sum(),
+        broad.verts.n.numpy()[0],
+        broad.verts.item_start.numpy()[-1],
+        broad.edges.n.numpy()[0],
+        broad.edges.item_start.numpy()[-1],
     ]
     assert min(used) > 0
-    work.near.tris.zero_()
-    near = work.near.tris.numpy()
-    near[0, 0] = 10, 0.7 * work.capacity.near
-    work.near.tris.assign(near)
-    used.append(near[0, 0][1])
+    broad.near.part.zero_()
+    near = broad.near.part.numpy()
+    near["tris"][0, 0] = 10, 0.7 * work.capacity.near
+    broad.near.part.assign(near)
+    used.append(near["tris"][0, 0, 1])
     needed = np.zeros(7, dtype=int)
     needed[0] = work.capacity.contacts + 10
-    work.contacts.needed.assign(needed)
+    work.overflow.all.assign(needed)
     got, have = astuple(capacity.enlarged(work)), astuple(work.capacity)
     assert got[0] == 2 * needed[0] and got[6] == 2 * used[6] and got[1] == have[1] > 2 * used[1]
     assert got[1:] == tuple(2 * n if 2 * n > h else h for n, h in zip(used, have, strict=True))[1:]
@@ -68,4 +73,87 @@ def test_lists_that_grow_together_cost_few_frames(device, monkeypatch):
     sim.step_frame()
     # In the order of the stages, where one that does not fit hides what comes after it.
     assert 1 <= len(grown) <= 6
-    assert not sim._stepper.work.contacts.needed.numpy().any()
+    assert not sim._stepper.work.overflow.all.numpy().any()
+
+
+def crowd(rng, turned) -> Scene:
+    scene = Scene()
+    for _ in range(6):
+        scene.add_body(box(0.2, 2), RUBBER, rng.uniform(-0.06, 0.06, 3), turned())
+    scene.add_plane((0.0, 0.0, 1.0), -0.05)
+    return scene
+
+
+def n_inside(model, state, work) -> int:
+    """Number of vertices inside other bodies; the broad phase looks first."""
+    broad_phase.refresh(model, state.x, state.x, work)
+    narrow_phase.find_inner_vertices(model, state.x, state.x, work)
+    return int(work.contacts.n_vertex.numpy()[0])
+
+
+@pytest.mark.parametrize("name", ["contacts", *LISTS])
+def test_what_does_not_fit_is_counted(rng, stages, turned, name):
+    k = [field.name for field in fields(Capacity)].index(name)
+    scene = crowd(rng, turned)
+    room = Capacity(4096, 64, 4096, 65536, 4096, 65536, 65536)
+    ample = stages(scene, room)
+    assert n_inside(*ample) > 0 and not ample[2].overflow.all.numpy().any()
+    model, state, work = stages(scene, replace(room, **{name: 2}))
+    n_inside(model, state, work)
+    needed = work.overflow.all.numpy()
+    assert needed[k] > 2 and np.count_nonzero(needed) == 1
+    if name in LISTS:  # then the list stays empty
+        model, state, work = stages(scene, replace(room, **{name: int(needed[k])}))
+        n_inside(model, state, work)
+        assert not work.overflow.all.numpy().any()
+
+
+def test_a_simulation_grows_its_buffers_and_loses_nothing(rng, turned):
+    scene = crowd(rng, turned)
+    tiny = Simulation(scene, fps=1000)
+    ample = Simulation(scene, fps=1000)
+    tight = Capacity(*[1] * 7)
+    roomy = Capacity(8192, 64, 8192, 65536, 8192, 65536, 65536)
+    tiny._stepper.use(allocate_work(tiny.model, tiny.state, tight))
+    ample._stepper.use(allocate_work(ample.model, ample.state, roomy))
+    for sim in (tiny, ample):
+        sim.step_frame()
+    np.testing.assert_array_equal(tiny.positions(), ample.positions())
+    np.testing.assert_array_equal(tiny.velocities(), ample.velocities())
+    assert tiny.measure().forces == ample.measure().forces
+    assert min(astuple(tiny._stepper.work.capacity)) > 1
+
+
+def test_buffers_that_grow_on_the_way_change_nothing(pile):
+    tight, ample = Simulation(pile), Simulation(pile)
+    shrunk = -1
+    for frame in range(16):
+        before = tight._stepper.work.warm  # with the impulses that the next frame starts from
+        held = int(before.n_edge.numpy()[0])
+        if frame >= 4 and held > 0 and shrunk < 0:
+            shrunk = frame
+            tight._stepper.use(allocate_work(tight.model, tight.state, Capacity(held, *[1] * 6)))
+            warm_start.copy(tight._stepper.work.warm, before)
+        for sim in (tight, ample):
+            # Short steps, which lengthen by a part from frame to frame, not from try to try.
+            sim._stepper.n = max(sim.substeps, 40)
+            sim.step_frame()
+        assert tight.substeps == ample.substeps
+        np.testing.assert_array_equal(tight.positions(), ample.positions())
+        np.testing.assert_array_equal(tight.velocities(), ample.velocities())
+        if shrunk >= 0 and frame >= shrunk + 3:
+            break
+    assert shrunk >= 0
+
+
+def test_a_deep_overlap_beyond_the_first_buffer_is_searched_all_the_same():
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    scene.add_body(box(0.2, 1), RUBBER, (1.0, 0.0, 0.1 - 1e-6))  # four shallow contacts come first
+    for k, z in enumerate((1.0, 1.18)):
+        scene.add_body(box(0.2, 2), NeoHookean(1e5 * 10**k, 0.3, 1000.0), (0.0, 0.0, z))
+    tiny, ample = Simulation(scene, fps=1000), Simulation(scene, fps=1000)
+    tiny._stepper.use(allocate_work(tiny.model, tiny.state, Capacity(contacts=4)))
+    for sim in (tiny, ample):
+        sim.step_frame()
+    np.testing.assert_array_equal(tiny.positions(), ample.positions())

@@ -117,7 +117,7 @@ def test_a_run_in_which_bodies_sleep_is_resumed_like_any_other(tmp_path, monkeyp
     assert cli.main([*command, str(whole)]) == 0
     interrupted(monkeypatch, "step_frame", 42, [*command, str(out)])
     with np.load(out / "checkpoint.npz") as checkpoint:
-        assert checkpoint["rest.awake"].tolist() == [0, 1]
+        assert checkpoint["sleeping.awake"].tolist() == [0, 1]
     assert cli.main([*command, str(out), "--resume"]) == 0
     assert contents(out) == contents(whole)
     capsys.readouterr()

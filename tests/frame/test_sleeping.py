@@ -149,7 +149,7 @@ def test_a_floor_that_sleeps_feels_the_weight_of_every_frame():
     assert asleep(sim) == 1
     ids = np.arange(len(scene.bodies[floor.index].x))
     for _ in sim.frames(3):
-        pressed = sim._stepper.work.impulse.numpy()[ids].sum(axis=0)
+        pressed = sim._stepper.work.forces.received.numpy()[ids].sum(axis=0)
         np.testing.assert_allclose(pressed[2], -9.81 / 60, rtol=0.02)
 
 
@@ -179,6 +179,6 @@ def test_a_buffer_that_grows_leaves_the_forces_of_those_asleep():
     sim = settled(tower(1))
     before = sim.measure().forces
     room = sim._stepper.work.capacity.pairs
-    sim._stepper.work.contacts.needed.fill_(room + 1)
+    sim._stepper.work.overflow.all.fill_(room + 1)
     assert sim._stepper.grow() and sim._stepper.work.capacity.pairs > room
     assert sim.measure().forces == before != {}

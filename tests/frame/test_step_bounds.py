@@ -7,7 +7,7 @@ import pytest
 
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box
 from warp_contact.frame import step_bounds
-from warp_contact.step.forces import MARGIN
+from warp_contact.step.forces import RATE_MARGIN
 
 OMEGA = 1000.0  # [1/s]
 STABLE = OMEGA / (2.0 * step_bounds.SAFETY)  # steps [1/s] of a body that does not move
@@ -77,9 +77,9 @@ def test_a_frame_is_repeated_with_a_higher_frequency_but_not_that_of_an_explosio
 
 def test_a_frame_keeps_its_stages_until_the_margin_of_the_damping_is_used_up():
     dt = 1e-3
-    rate = 4.0 / (MARGIN * dt)  # two stages, whose share is chosen for 4
-    assert step_bounds.stays_damped(dt, rate, 0.999 * MARGIN * rate)
-    assert not step_bounds.stays_damped(dt, rate, 1.001 * MARGIN * rate)
+    rate = 4.0 / (RATE_MARGIN * dt)  # two stages, whose share is chosen for 4
+    assert step_bounds.stays_damped(dt, rate, 0.999 * RATE_MARGIN * rate)
+    assert not step_bounds.stays_damped(dt, rate, 1.001 * RATE_MARGIN * rate)
     assert step_bounds.stays_damped(dt, 0.0, 0.0)
 
 

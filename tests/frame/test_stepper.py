@@ -156,7 +156,7 @@ def test_buffers_outgrown_within_a_frame_end_it_at_once(looks, monkeypatch):
     def outgrown(work):
         asked.append(len(asked))
         if len(asked) == 2:  # first after the look for overlaps at the start, then after a part
-            work.contacts.needed.fill_(work.capacity.contacts + 1)
+            work.overflow.all.fill_(work.capacity.contacts + 1)
         return enlarged(work)
 
     monkeypatch.setattr(stepper, "enlarged", outgrown)

@@ -5,6 +5,7 @@ import warp as wp
 
 from warp_contact.kernels.broad_phase import pairs
 from warp_contact.kernels.narrow_phase import contact_graph
+from warp_contact.kernels.narrow_phase.contact import Contact
 
 
 def ints(values) -> wp.array:
@@ -64,12 +65,15 @@ def test_a_vertex_of_weight_zero_takes_part_and_a_repeated_one_does_not(device):
     vert = np.array([[0, 0, 1, 2, 3], [4, 4, 4, 4, 4], [0, 1, 2, 3, 3]])
     coef = np.float32([[1, 0, -0.5, -0.5, 0], [1, 0, 0, 0, 0], [0, 1, -0.3, -0.7, 0]])
     taking = {(0, 0), (0, 2), (0, 3), (0, 4), (1, 0), (2, 0), (2, 1), (2, 2), (2, 3)}
-    n, rows = wp.array([3], dtype=int), [wp.array(vert, dtype=int), wp.array(coef)]
+    records = wp.zeros(3, dtype=Contact).numpy()
+    records["vert"], records["coef"] = vert, coef
+    n, contacts = wp.array([3], dtype=int), wp.array(records, dtype=Contact)
     count, n_touched = wp.zeros(6, dtype=int), wp.zeros(1, dtype=int)
-    wp.launch(contact_graph.count_entries, dim=2, inputs=[2, n, *rows], outputs=[n_touched, count])
+    inputs = [2, n, contacts]
+    wp.launch(contact_graph.count_entries, dim=2, inputs=inputs, outputs=[n_touched, count])
     expected = np.bincount([vert[place] for place in taking], minlength=6)
     np.testing.assert_array_equal(count.numpy(), expected)
     start = wp.array(np.cumsum(expected), dtype=int)
     entry = wp.full(15, -1, dtype=int)
-    wp.launch(contact_graph.fill_entries, dim=2, inputs=[2, n, *rows], outputs=[start, entry])
+    wp.launch(contact_graph.fill_entries, dim=2, inputs=inputs, outputs=[start, entry])
     assert {divmod(e, 5) for e in entry.numpy()[: len(taking)].tolist()} == taking

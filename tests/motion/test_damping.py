@@ -118,7 +118,10 @@ def test_with_the_least_share_no_mode_is_turned_round():
 def test_steps_are_stable_whatever_share_is_needed():
     """Of any mode within reach, with and without a damping in proportion to its stiffness."""
     ends = [forces.reach(stages, forces.SHARE[1]) for stages in range(1, 13)]
-    for z in [*np.geomspace(1e-3, 200.0, 400), *np.array(ends) / forces.MARGIN * (1.0 - 1e-12)]:
+    for z in [
+        *np.geomspace(1e-3, 200.0, 400),
+        *np.array(ends) / forces.RATE_MARGIN * (1.0 - 1e-12),
+    ]:
         stages, share = forces.stages_for(z, 1.0), forces.share_for(z, 1.0)
         reach = forces.reach(stages, share)
         part = np.linspace(0.0, reach / limit(stages, share), 2001)
@@ -197,8 +200,8 @@ def test_enough_stages_are_taken():
         s = forces.stages_for(z / 1e-3, 1e-3)
         share = forces.share_for(z / 1e-3, 1e-3)
         assert forces.SHARE[0] <= share <= forces.SHARE[1]
-        assert z * forces.MARGIN <= forces.reach(s, share) * (1.0 + 1e-12)  # rounding
-        assert s == 0 or z * forces.MARGIN > forces.reach(s - 1, forces.SHARE[1])
+        assert z * forces.RATE_MARGIN <= forces.reach(s, share) * (1.0 + 1e-12)  # rounding
+        assert s == 0 or z * forces.RATE_MARGIN > forces.reach(s - 1, forces.SHARE[1])
 
 
 @pytest.mark.parametrize("material", [NeoHookean, Corotated])

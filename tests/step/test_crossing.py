@@ -1,4 +1,4 @@
-"""Edges across other bodies: the ridge against ridge that the paper leaves out."""
+"""narrow_phase.py, edges across other bodies: the ridge against ridge that the paper leaves out."""
 
 import numpy as np
 import pytest

@@ -12,10 +12,11 @@ from warp_contact.scene.scene import rotation_matrix
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 
 
-def hits(model, work) -> dict[tuple[int, int], tuple[int, float, np.ndarray]]:
-    n = int(work.n_hit.numpy()[0])
-    arrays = work.hit_vert, work.hit_body, work.hit_layer, work.hit_depth, work.hit_dir
-    rows = zip(*(a.numpy()[:n] for a in arrays), strict=True)
+def penetrations(work) -> dict[tuple[int, int], tuple[int, float, np.ndarray]]:
+    n = int(work.contacts.n_vertex.numpy()[0])
+    p = work.narrow_phase.penetration.numpy()[:n]
+    fields = ("vert", "body", "layer", "depth", "direction")
+    rows = zip(*(p[name] for name in fields), strict=True)
     return {(int(i), int(b)): (int(layer), float(d), r) for i, b, layer, d, r in rows}
 
 
@@ -33,7 +34,7 @@ def test_depth_is_exact_under_a_flat_side_on_every_layer(stages, find_contacts, 
     find_contacts(model, work, state.x)
     x = state.x.numpy()
     layers = []
-    for (i, body), (layer, d, r) in hits(model, work).items():
+    for (i, body), (layer, d, r) in penetrations(work).items():
         if body == 0:
             layers.append(layer)
             # Ten roundings of coordinates of order 1.
@@ -56,7 +57,7 @@ def test_depth_and_direction_turn_with_the_frame(rng, stages, find_contacts, tur
     found = []
     for scene in scenes:
         model, state, work = stages(scene)
-        found.append((find_contacts(model, work, state.x), hits(model, work)))
+        found.append((find_contacts(model, work, state.x), penetrations(work)))
     (one, plain), (two, rotated) = found
     assert plain.keys() == rotated.keys() and len(plain) > 10
     for key, (layer, d, r) in plain.items():
@@ -98,7 +99,7 @@ def test_contact_weights_sum_to_zero_and_directions_are_unit(
     np.testing.assert_allclose(c.coef[used, :2].sum(axis=1), 1.0, atol=1e-6)
     np.testing.assert_allclose(c.coef[used].sum(axis=1), 0.0, atol=2e-6)
     np.testing.assert_allclose(np.linalg.norm(c.normal[used], axis=1), 1.0, atol=1e-6)
-    assert (c.depth >= -2e-3 * model.body_edge.numpy().max()).all()  # in the skin of stage 1
+    assert (c.depth >= -2e-3 * model.body_edge.numpy().max()).all()  # the speculative margin
     assert on_surface[c.vert[used]].all()
     owner = model.vert_body.numpy()[c.vert[used]]
     np.testing.assert_array_equal(owner[:, 0], c.pair[used, 0])
@@ -129,7 +130,7 @@ def test_a_vertex_goes_back_by_the_side_it_came_in_by(rng, stages, find_contacts
     model, state, work = stages(scene)
     x = state.x.numpy() + rng.uniform(-0.5, 0.5, 3).astype(np.float32)  # both fly
     x[-4:] -= (before + depth) * rotate[:, 2].astype(np.float32)
-    c = find_contacts(model, work, state.x, wp.array(x, dtype=wp.vec3), fresh=True)
+    c = find_contacts(model, work, state.x, wp.array(x, dtype=wp.vec3), apart=True)
     (k,) = np.flatnonzero(c.vert[:, 0] == len(x) - 4)
     np.testing.assert_allclose(c.normal[k], rotate[:, 2], atol=1e-5)  # float32
     assert c.depth[k] == pytest.approx(depth, abs=1e-6)
@@ -216,7 +217,7 @@ def test_depths_are_those_of_the_published_formulas(rng, stages, find_contacts, 
     scene.add_body(jittered(0.9, 4), RUBBER, (0.0, 0.0, 0.55), turned())
     model, state, work = stages(scene)
     find_contacts(model, work, state.x)
-    found = hits(model, work)
+    found = penetrations(work)
     n = 0
     for body in (0, 1):
         inside = {i for i, b in found if b == body}

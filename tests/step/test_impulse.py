@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, box
-from warp_contact.step import impulse
+from warp_contact.step import impulse, sweeps
 
 DT = 1e-3
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -51,10 +51,10 @@ def test_impulses_keep_the_momentum(rng, stages, find_contacts, records, jittere
     scene = meeting(rng, jittered, friction)
     model, x0, v0, v1, c = exchanged(scene, stages, find_contacts, records)
     linear, angular = momentum_changes(model, x0, v0, v1)
-    assert (c.lam > 0.0).sum() > 10
+    assert (c.normal_impulse > 0.0).sum() > 10
     # Each of up to 48 sweeps rounds every velocity of up to 5 m/s; heavy ones hardly change.
     assert linear < 1e-5
-    # Overlaps this deep are further than a couple reaches: only without friction.
+    # Overlaps this deep are further than a torque reaches: only without friction.
     assert friction > 0.0 or angular < 1e-5
 
 
@@ -64,15 +64,15 @@ def test_friction_across_a_gap_keeps_the_angular_momentum(
     # Gaps of 5 to 19 mm between cells of 1/3 m that close within the step.
     scene = meeting(rng, jittered, 0.5, part=0.01, spacing=1.012, speed=25.0)
     model, x0, v0, v1, c = exchanged(scene, stages, find_contacts, records)
-    used = c.lam > 0.0
-    assert used.sum() > 10 and (c.open[used] > 1e-3).mean() > 0.5
-    couples = (c.open * np.linalg.norm(c.slip, axis=1)).sum()
-    # A triangle that is too thin for its gap takes no couple: friction then turns the pair.
-    untaken = np.linalg.norm(c.slip, axis=1)[c.open == 0.0].sum() * 0.03
+    used = c.normal_impulse > 0.0
+    assert used.sum() > 10 and (c.gap[used] > 1e-3).mean() > 0.5
+    torques = (c.gap * np.linalg.norm(c.friction_impulse, axis=1)).sum()
+    # A triangle that is too thin for its gap takes no torque: friction then turns the pair.
+    untaken = np.linalg.norm(c.friction_impulse, axis=1)[c.gap == 0.0].sum() * 0.03
     linear, angular = momentum_changes(model, x0, v0, v1)
     passed = np.abs(model.mass.numpy()[:, None] * (v1 - v0)).sum()
-    print(f"couples of the friction {couples / passed:.1e} m")
-    assert couples > 1e-4 * passed
+    print(f"torques of the friction {torques / passed:.1e} m")
+    assert torques > 1e-4 * passed
     # As above, of velocities of 50 m/s that change by a part; weights on cells of 1/3 m round.
     assert linear < 1e-5 and angular < 1e-5 + untaken / passed
 
@@ -87,20 +87,20 @@ def test_impulses_never_add_kinetic_energy(
         body.v[body.fixed] = 0.0
     model, _, v0, v1, c = exchanged(scene, stages, find_contacts, records)
     mass = model.mass.numpy().astype(float)[:, None]
-    assert (c.lam > 0.0).any()
+    assert (c.normal_impulse > 0.0).any()
     before, after = ((mass * v * v).sum() for v in (v0, v1))
     # Rounding of up to 48 sweeps.
     assert after <= (1.0 + 1e-5) * before
 
 
-def test_the_couple_of_friction_adds_no_energy_to_a_light_corner(stages, find_contacts, records):
-    # Heavy corners above fixed ones of a light face: its free corner takes little but the couple.
+def test_the_torque_of_friction_adds_no_energy_to_a_light_corner(stages, find_contacts, records):
+    # Heavy corners above fixed ones of a light face: its free corner takes little but the torque.
     scene = Scene(gravity=(0.0, 0.0, 0.0), friction=5.0)
     scene.add_body(box(1.0, 1), NeoHookean(1e5, 0.3, 1.0), fixed=np.arange(8) != 5)
     place, v = (-0.34, -0.34, 0.69), (5.0, 5.0, -60.0)
     scene.add_body(box(0.3, 1), NeoHookean(1e5, 0.3, 1e6), place, velocity=v)
     model, _, v0, v1, c = exchanged(scene, stages, find_contacts, records, edges=False)
-    taken = np.linalg.norm(c.slip, axis=1) * c.open
+    taken = np.linalg.norm(c.friction_impulse, axis=1) * c.gap
     assert (taken > 0.0).any()
     mass = model.mass.numpy().astype(float)[:, None]
     before, after = ((mass * v * v).sum() for v in (v0, v1))
@@ -108,24 +108,24 @@ def test_the_couple_of_friction_adds_no_energy_to_a_light_corner(stages, find_co
 
 
 def rubbed(c) -> tuple[np.ndarray, np.ndarray]:
-    """Tangential impulses, split into the parts along the ramps over ``lam``, and friction."""
+    """Tangential impulses: their parts along the ramps, in these, and what is left: friction."""
     steep = np.einsum("ci,ci->c", c.ramp, c.ramp)
-    along = np.einsum("ci,ci->c", c.slip, c.ramp) / np.where(steep > 0.0, steep, 1.0)
-    s = np.clip(along, 0.0, c.lam)
-    return s, c.slip - s[:, None] * c.ramp
+    along = np.einsum("ci,ci->c", c.friction_impulse, c.ramp) / np.where(steep > 0.0, steep, 1.0)
+    s = np.clip(along, 0.0, c.normal_impulse)
+    return s, c.friction_impulse - s[:, None] * c.ramp
 
 
 def test_friction_stays_in_the_cone_and_normal_impulses_push(
     rng, stages, find_contacts, records, jittered
 ):
     _, _, _, _, c = exchanged(meeting(rng, jittered, 0.4), stages, find_contacts, records)
-    assert (c.lam >= 0.0).all() and (np.linalg.norm(c.slip, axis=1) > 0.0).any()
+    size = np.linalg.norm(c.friction_impulse, axis=1)
+    assert (c.normal_impulse >= 0.0).all() and (size > 0.0).any()
     # Rounding of the terms of the differences.
-    room = 0.4 * c.lam + 1e-6 * (c.lam + np.linalg.norm(c.slip, axis=1))
+    room = 0.4 * c.normal_impulse + 1e-6 * (c.normal_impulse + size)
     assert (np.linalg.norm(rubbed(c)[1], axis=1) <= room).all()
-    np.testing.assert_allclose(
-        np.einsum("ci,ci->c", c.slip, c.normal), 0.0, atol=1e-5 * np.abs(c.slip).max()
-    )
+    out_of_plane = np.einsum("ci,ci->c", c.friction_impulse, c.normal)
+    np.testing.assert_allclose(out_of_plane, 0.0, atol=1e-5 * np.abs(c.friction_impulse).max())
 
 
 def test_without_friction_impulses_are_between_the_normals_and_those_of_the_facets(
@@ -137,7 +137,7 @@ def test_without_friction_impulses_are_between_the_normals_and_those_of_the_face
         _, x0, _, _, c = exchanged(scene, stages, find_contacts, records, edges=False)
         s, left = rubbed(c)
         climbs += (s > 0.0).sum()
-        np.testing.assert_allclose(left, 0.0, atol=1e-6 * c.lam.max())  # rounding
+        np.testing.assert_allclose(left, 0.0, atol=1e-6 * c.normal_impulse.max())  # rounding
         used = np.linalg.norm(c.ramp, axis=1) > 0.0
         a, b, d = np.moveaxis(x0[c.vert[used, 2:]], 1, 0)
         facet = np.cross(b - a, d - a)
@@ -152,12 +152,12 @@ def test_no_contact_approaches_further_than_its_gap(rng, stages, find_contacts, 
     scene = meeting(rng, jittered, 0.3)
     model, _, _, v1, c = exchanged(scene, stages, find_contacts, records, edges=False)
     u = np.einsum("ck,cki,ci->c", c.coef, v1[c.vert], c.normal)
-    used = c.weight > 0.0
-    too_far = -DT * (u + np.maximum(c.closing, 0.0))[used] / model.body_edge.numpy()[0]
+    used = c.inv_mass > 0.0
+    too_far = -DT * (u + np.maximum(c.gap_bound, 0.0))[used] / model.body_edge.numpy()[0]
     print(f"worst {too_far.max():.1e} of an edge")
     # The sweeps end at their tolerance, or after 48 with some clusters of contacts to go: 3.4e-5 is
     # the worst of 30 draws.
-    assert np.median(too_far) < impulse.TOLERANCE and too_far.max() < 1e-3
+    assert np.median(too_far) < impulse.IMPULSE_TOLERANCE and too_far.max() < 1e-3
 
 
 def test_fixed_vertices_keep_their_velocity(rng, stages, find_contacts, records, jittered):
@@ -171,17 +171,18 @@ def test_fixed_vertices_keep_their_velocity(rng, stages, find_contacts, records,
 
 def test_recorded_impulses_of_a_pair_are_its_sum(rng, stages, find_contacts, jittered):
     scene = meeting(rng, jittered, 0.5)
-    model, state, work = stages(scene, dt=DT)
+    unit = 1e-9
+    model, state, work = stages(scene, dt=DT, unit=unit)
     v0 = state.v.numpy().astype(float)
     ahead = wp.array(state.x.numpy() + DT * v0, dtype=wp.vec3)
     find_contacts(model, work, state.x, ahead)
     impulse.exchange(model, state.v, work)
-    unit = 1e-9
-    impulse.record(work, unit)
+    impulse.record(work)
     mass = model.mass.numpy().astype(float)[:, None]
     first = np.flatnonzero(model.vert_body.numpy() == 0)
     got = np.zeros(3)
-    for key, total in zip(work.pair_key.numpy(), work.pair_total.numpy(), strict=True):
+    forces = work.forces
+    for key, total in zip(forces.pair_key.numpy(), forces.pair_total.numpy(), strict=True):
         if key >= 0 and key >> 32 == 0:
             got += unit * total
     change = (mass * (state.v.numpy() - v0))[first].sum(axis=0)
@@ -201,7 +202,9 @@ def test_blocks_of_one_tet_fall_flat_on_a_plane(stages, find_contacts, records):
     np.testing.assert_array_equal(v1[above], [[1.0, 2.0, -3.0]] * 4)
 
 
-def test_contacts_are_left_alone_only_when_they_are_done(rng, stages, find_contacts, monkeypatch):
+def test_contacts_are_left_alone_only_when_they_are_done(
+    rng, stages, find_contacts, records, monkeypatch
+):
     scene = Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
     for k, speed in enumerate((0.1, 2.0)):  # blocks that come down on others, faster and slower
         aside = rng.uniform(-0.02, 0.02, 2)
@@ -211,22 +214,22 @@ def test_contacts_are_left_alone_only_when_they_are_done(rng, stages, find_conta
     model, state, work = stages(scene, dt=DT)
     ahead = wp.array(state.x.numpy() + DT * state.v.numpy(), dtype=wp.vec3)
     find_contacts(model, work, state.x, ahead, edges=True)
-    c, n = work.contacts, int(work.contacts.n.numpy()[0])
-    alone = []
+    n, alone = int(work.contacts.n.numpy()[0]), []
 
-    def watched(work, first, next_sweep=impulse.next_sweep):
-        alone.append(int((c.busy.numpy()[:n] == 0).sum()))
-        next_sweep(work, first)
+    def watched(work, first=False, count=sweeps.count):
+        alone.append(int((work.sweeps.busy.numpy()[:n] == 0).sum()))
+        count(work, first)
 
-    monkeypatch.setattr(impulse, "next_sweep", watched)
+    monkeypatch.setattr(sweeps, "count", watched)
     monkeypatch.setattr(impulse, "SWEEPS", 1000)  # to the end
     impulse.exchange(model, state.v, work)
-    vert, coef, normal = (a.numpy()[:n].astype(float) for a in (c.vert, c.coef, c.normal))
-    v = state.v.numpy().astype(float)[vert.astype(int)]
+    c = records(work)
+    coef, normal = c.coef.astype(float), c.normal.astype(float)
+    v = state.v.numpy().astype(float)[c.vert]
     u = ((coef[:, :, None] * v).sum(axis=1) * normal).sum(axis=1)
-    approach = DT * (-u - np.maximum(c.closing.numpy()[:n], 0.0)).max()
+    approach = DT * (-u - np.maximum(c.gap_bound, 0.0)).max()
     edge = float(model.body_edge.numpy().min())
     print(f"{n} contacts, alone {alone}, approach {approach / edge:.1e}")
-    assert work.done.numpy()[0] <= impulse.SWEEPS and max(alone[2:]) > n // 8
+    assert work.sweeps.number.numpy()[0] <= impulse.SWEEPS and max(alone[2:]) > n // 8
     # The last sweep, of all contacts at once, moves the vertices that they share once more.
-    assert approach < 5.0 * impulse.TOLERANCE * edge
+    assert approach < 5.0 * impulse.IMPULSE_TOLERANCE * edge

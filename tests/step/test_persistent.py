@@ -1,4 +1,4 @@
-"""persistent.py: contacts of edges that go on from step to step, and across frames."""
+"""narrow_phase.py, persistent contacts of edges: they go on from step to step, across frames."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, box
 from warp_contact.frame import stepper
-from warp_contact.step import impulse, step
+from warp_contact.step import impulse, narrow_phase, warm_start
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0, damping=2e-3)
 WEIGHT = 0.4 * 0.1 * 0.1 * 1000.0 * 9.81  # of a beam [N]
@@ -27,32 +27,40 @@ def lying(device) -> Simulation:
     sim = Simulation(scene, device=str(device))
     for _ in sim.frames(10):
         pass
-    assert sim._stepper.work.n_hit.numpy()[0] == 0
+    assert sim._stepper.work.contacts.n_vertex.numpy()[0] == 0
     return sim
 
 
 def kept(sim: Simulation) -> np.ndarray:
     """The contacts of edges that the last step leaves to the next."""
     warm = sim._stepper.work.warm
-    return warm.held.numpy()[: warm.n_held.numpy()[0]]
+    return warm.edges.numpy()[: warm.n_edge.numpy()[0]]
 
 
 def go_on(sim: Simulation) -> dict[str, np.ndarray]:
-    """Begin a step: the records of the contacts that are held, and what they start from."""
+    """Begin a step: the contacts that go on, and the impulses that they start from."""
     model, x, work = sim.model, sim.state.x, sim._stepper.work
-    step.vertex_contacts(model, x, x, work, True)
-    step.hold_edges(model, x, work, search=False)
-    step.arrange(model, x, work)
-    impulse.recall_edges(work)
+    narrow_phase.find_entered_vertices(model, x, x, work)
+    narrow_phase.continue_edges(model, x, work)
+    impulse.begin(model, x, work)
+    warm_start.recall_edges(work)
+    return contacts_of(work)
+
+
+def contacts_of(work) -> dict[str, np.ndarray]:
+    """What contacts are, what holds them, and their normal impulses."""
     c, n = work.contacts, int(work.contacts.n.numpy()[0])
-    return {k: getattr(c, k).numpy()[:n] for k in ("vert", "coef", "normal", "lam", "pair")}
+    record = c.record.numpy()[:n]
+    found = {name: record[name].copy() for name in ("vert", "coef", "normal", "pair")}
+    found["inv_mass"] = c.constraint.numpy()[:n]["inv_mass"].copy()
+    return found | {"impulse": c.impulse.numpy()[:n]["normal"].copy()}
 
 
 def test_a_contact_of_two_edges_goes_on_where_they_are_closest(lying):
     before, now = kept(lying), go_on(lying)
     pressed = before[before["kept"][:, 3] > 0.0]
-    assert len(now["lam"]) == len(pressed) > 0
-    np.testing.assert_array_equal(now["lam"], pressed["kept"][:, 3])
+    assert len(now["impulse"]) == len(pressed) > 0
+    np.testing.assert_array_equal(now["impulse"], pressed["kept"][:, 3])
     x = lying.positions().astype(float)
     for vert, coef, normal in zip(now["vert"], now["coef"], now["normal"], strict=True):
         p, q, a, b = x[vert[:4]]
@@ -67,13 +75,12 @@ def test_a_contact_of_two_edges_goes_on_where_they_are_closest(lying):
 
 def arranged(work) -> dict[str, np.ndarray]:
     """What the impulses see of the contacts."""
-    c, n = work.contacts, int(work.contacts.n.numpy()[0])
-    start = c.start.numpy().copy()
-    found = {k: getattr(c, k).numpy()[:n].copy() for k in ("vert", "coef", "weight", "lam")}
-    touched = np.sort(c.touched.numpy()[: c.n_touched.numpy()[0]])
-    return found | {
+    graph = work.contacts.graph
+    start = graph.start.numpy().copy()
+    touched = np.sort(graph.touched.numpy()[: graph.n_touched.numpy()[0]])
+    return contacts_of(work) | {
         "start": start,
-        "entry": c.entry.numpy()[: start[-1]].copy(),
+        "entry": graph.entry.numpy()[: start[-1]].copy(),
         "touched": touched,
     }
 
@@ -82,9 +89,10 @@ def test_a_look_that_finds_nothing_new_leaves_the_contacts_alone(lying):
     work, x = lying._stepper.work, lying.state.x
     go_on(lying)
     before = arranged(work)
-    assert (before["lam"] > 0.0).any()
-    step.edge_contacts(lying.model, x, x, work, True, hold=True)
-    assert work.n_new.numpy()[0] == 0
+    assert (before["impulse"] > 0.0).any()
+    narrow_phase.find_entered_edges(lying.model, x, x, work)
+    impulse.add_edges(lying.model, lying.state, work)
+    assert work.narrow_phase.n_new.numpy()[0] == 0
     after = arranged(work)
     for name, value in before.items():
         np.testing.assert_array_equal(after[name], value)
@@ -93,10 +101,10 @@ def test_a_look_that_finds_nothing_new_leaves_the_contacts_alone(lying):
 def test_contacts_may_be_arranged_more_than_once(lying):
     work, x = lying._stepper.work, lying.state.x
     go_on(lying)
-    step.arrange(lying.model, x, work)
+    impulse.begin(lying.model, x, work)
     before = arranged(work)
     assert len(before["touched"]) == np.count_nonzero(np.diff(before["start"])) > 0
-    step.arrange(lying.model, x, work)
+    impulse.begin(lying.model, x, work)
     for name, value in arranged(work).items():
         np.testing.assert_array_equal(value, before[name])
 
@@ -117,7 +125,7 @@ def test_what_was_moved_away_is_forgotten(lying, way):
     x = lying.positions()
     x[upper] += np.float32(way)
     lying.state.x.assign(x)
-    assert len(go_on(lying)["lam"]) == 0
+    assert len(go_on(lying)["impulse"]) == 0
     before = lying.measure().momentum[2]
     lying.step_frame()
     assert lying.measure().forces == {}
@@ -126,12 +134,12 @@ def test_what_was_moved_away_is_forgotten(lying, way):
     assert len(kept(lying)) == 0
 
 
-def test_without_an_impulse_a_contact_is_not_held(lying):
+def test_without_an_impulse_a_contact_does_not_go_on(lying):
     warm = lying._stepper.work.warm
-    held = warm.held.numpy()
-    held["kept"][:, 3] = 0.0
-    warm.held.assign(held)
-    assert len(go_on(lying)["lam"]) == 0
+    edges = warm.edges.numpy()
+    edges["kept"][:, 3] = 0.0
+    warm.edges.assign(edges)
+    assert len(go_on(lying)["impulse"]) == 0
 
 
 def test_a_frame_that_is_repeated_starts_from_the_same_impulses(lying, tmp_path, monkeypatch):
@@ -153,27 +161,28 @@ def test_contacts_that_take_all_the_places_ask_for_more(lying):
     """Those of the last step keep their places also when they are over."""
     work = lying._stepper.work
     warm, room = work.warm, work.capacity.contacts
-    held = warm.held.numpy()
-    held[:] = held[0]
-    held["kept"][:, 3] = 0.0
-    warm.held.assign(held)
-    warm.n_held.fill_(room)
+    edges = warm.edges.numpy()
+    edges[:] = edges[0]
+    edges["kept"][:, 3] = 0.0
+    warm.edges.assign(edges)
+    warm.n_edge.fill_(room)
     ahead = lying.positions()
     ahead[slice(*lying.model.body_vert.numpy()[1:3]), 2] -= np.float32(1e-4)
     go_on(lying)
-    assert not work.contacts.needed.numpy().any()
+    assert not work.overflow.all.numpy().any()
     x = wp.array(ahead, dtype=wp.vec3)
-    step.edge_contacts(lying.model, lying.state.x, x, work, True, hold=True)
-    assert work.n_crossing.numpy()[0] > 0
-    assert work.contacts.needed.numpy()[0] > room
+    narrow_phase.find_entered_edges(lying.model, lying.state.x, x, work)
+    impulse.add_edges(lying.model, lying.state, work)
+    assert work.narrow_phase.n_crossing.numpy()[0] > 0
+    assert work.overflow.all.numpy()[0] > room
 
 
 def test_places_are_counted_from_none_in_every_step(lying):
     """Where no vertex is near, nobody else begins to count."""
     work = lying._stepper.work
-    work.warm.n_held.zero_()
-    assert work.candidates.verts.n.numpy()[0] == 0
+    work.warm.n_edge.zero_()
+    assert work.broad_phase.verts.n.numpy()[0] == 0
     for _ in range(2):
-        work.n_place.fill_(77)
+        work.narrow_phase.n_place.fill_(77)
         go_on(lying)
-        assert work.n_place.numpy()[0] == 0
+        assert work.narrow_phase.n_place.numpy()[0] == 0

@@ -1,11 +1,11 @@
-"""Predicted forces of many contacts at once: one pass, momentum, shared vertices."""
+"""other_responses.py, predicted forces of many contacts: one pass, momentum, shared vertices."""
 
 import numpy as np
 import pytest
 import warp as wp
 
 from warp_contact import ContactSurface, NeoHookean, PredictedForce, Scene, Simulation, box
-from warp_contact.step import impulse, step
+from warp_contact.step import loop, other_responses
 
 DT = 1e-3
 FRICTION = 0.4
@@ -28,8 +28,9 @@ def test_every_contact_gets_its_overlap_over_its_share_of_the_masses(
     model, state, work = stages(meeting(jittered), dt=DT)
     ahead = state.x.numpy() + DT * state.v.numpy()
     v0 = state.v.numpy().astype(float)
-    c = find_contacts(model, work, state.x, wp.array(ahead, dtype=wp.vec3), edges=True)
-    impulse.push_apart(model, wp.array(ahead, dtype=wp.vec3), state.v, work)
+    work.x.assign(ahead)
+    find_contacts(model, work, state.x, work.x, edges=True)
+    other_responses._push_apart(model, state, work)
     c, inv_mass = records(work), model.inv_mass.numpy().astype(float)
     real = np.abs(c.coef).sum(axis=1) > 0.0
     among = [np.unique(vert) for vert in c.vert[real]]
@@ -39,12 +40,12 @@ def test_every_contact_gets_its_overlap_over_its_share_of_the_masses(
     want = np.where(real, np.maximum(-gap, 0.0) / (DT * np.where(real, weight, 1.0)), 0.0)
     assert (want > 0.0).sum() > 10 and sharing.max() > 3
     # Gaps of some hundredths in coordinates of order 1, float32.
-    np.testing.assert_allclose(c.lam, want, rtol=1e-4, atol=1e-4 * want.max())
+    np.testing.assert_allclose(c.normal_impulse, want, rtol=1e-4, atol=1e-4 * want.max())
     slide = np.einsum("ck,cki->ci", c.coef, v0[c.vert])
     slide -= np.einsum("ci,ci->c", slide, c.normal)[:, None] * c.normal
-    size = np.linalg.norm(c.slip, axis=1)
-    assert (size <= FRICTION * (1.0 + 1e-5) * c.lam).all() and size.max() > 0.0
-    assert (np.einsum("ci,ci->c", c.slip, slide) <= 0.0).all()
+    size = np.linalg.norm(c.friction_impulse, axis=1)
+    assert (size <= FRICTION * (1.0 + 1e-5) * c.normal_impulse).all() and size.max() > 0.0
+    assert (np.einsum("ci,ci->c", c.friction_impulse, slide) <= 0.0).all()
 
 
 def launched(monkeypatch, model, state, work, response) -> list[str]:
@@ -57,17 +58,17 @@ def launched(monkeypatch, model, state, work, response) -> list[str]:
 
     with monkeypatch.context() as patch:
         patch.setattr(wp, "launch", note)
-        step.step(model, state, work, response, 0, True, 1e-9)
+        loop.step_of(response, overlapping=True)(model, state, work, 0)
     return keys
 
 
 def test_one_pass_without_sweeps_search_or_closure(monkeypatch, stages, jittered):
     steps = {}
     for response in (PredictedForce(), ContactSurface()):
-        model, state, work = stages(meeting(jittered), dt=DT)
+        model, state, work = stages(meeting(jittered), dt=DT, unit=1e-9)
         steps[type(response)] = launched(monkeypatch, model, state, work, response)
     ours, default = steps[PredictedForce], steps[ContactSurface]
-    more = {"closure", "region", "search"}
+    more = {"closure", "region", "residual", "search"}
     print(sorted(set(default) - set(ours)))
     assert more <= {key.split(".")[0] for key in default}
     assert not more & {key.split(".")[0] for key in ours}

@@ -3,17 +3,18 @@
 import numpy as np
 
 from warp_contact import NeoHookean, Scene, box
-from warp_contact.step import surface
+from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
+from warp_contact.step import residual, search
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 
 
-def search(scene: Scene, stages, find_contacts, records, edges: bool = False) -> tuple:
+def region(scene: Scene, stages, find_contacts, records, edges: bool = False) -> tuple:
     """Stages 1 to 3 at the initial positions: model, work, contact records."""
     model, state, work = stages(scene)
     find_contacts(model, work, state.x, edges=edges)
-    surface.leftover(model, state.x, work)
-    surface.begin_search(model, state.x, work)
+    residual.find_gaps(model, state.x, work)
+    search.begin(model, state.x, work)
     return model, work, records(work)
 
 
@@ -21,7 +22,7 @@ def displacements(c, n_vert: int) -> np.ndarray:
     """Eq. (1) contact by contact: s = (d - sum w_i d_i) / (sum w_i + 1)."""
     own, own_weight = np.zeros((n_vert, 3)), np.zeros(n_vert)
     pushed, weight = np.zeros((n_vert, 3)), np.zeros(n_vert)
-    for vert, coef, normal, depth in zip(c.vert, c.coef, c.normal, c.left, strict=True):
+    for vert, coef, normal, depth in zip(c.vert, c.coef, c.normal, c.residual, strict=True):
         if depth > 0.0:
             for k in range(5):
                 w, i = abs(float(coef[k])), vert[k]
@@ -41,8 +42,8 @@ def test_displacement_vectors_are_those_of_eq_1(
     scene = Scene()
     for place in rng.uniform(-0.4, 0.4, (3, 3)):
         scene.add_body(jittered(1.0, 3), RUBBER, place, turned())
-    model, work, c = search(scene, stages, find_contacts, records, edges=True)
-    s = work.s.numpy()
+    model, work, c = region(scene, stages, find_contacts, records, edges=True)
+    s = work.surface.s.numpy()
     assert (np.linalg.norm(s, axis=1) > 0.0).sum() > 20
     # Sums of tens of terms of order 1 in float32.
     np.testing.assert_allclose(s, displacements(c, model.n_vert), rtol=0.0, atol=5e-6)
@@ -53,17 +54,17 @@ def test_overlap_left_is_the_gap_of_the_records(rng, stages, find_contacts, reco
     scene.add_plane((0.0, 0.6, 0.8), -0.2)
     for place in rng.uniform(-0.3, 0.3, (2, 3)):
         scene.add_body(jittered(1.0, 2), RUBBER, place)
-    model, work, c = search(scene, stages, find_contacts, records)
+    model, work, c = region(scene, stages, find_contacts, records)
     x = work.x.numpy().astype(float)
     gap = np.einsum("ck,cki,ci->c", c.coef, x[c.vert], c.normal) - c.offset
     used = (c.coef != 0.0).any(axis=1)
     assert (c.pair[used, 1] == model.n_body).any()
-    least = surface.TOLERANCE * model.body_edge.numpy()[c.pair[:, 0]]
+    least = CLOSURE_TOLERANCE * model.body_edge.numpy()[c.pair[:, 0]]
     # Coordinates of order 1 in float32.
     counted, too_small = used & (-gap > least + 1e-6), used & (-gap < least - 1e-6)
-    np.testing.assert_allclose(c.left[counted], -gap[counted], atol=1e-6)
-    np.testing.assert_array_equal(c.left[too_small], 0.0)
-    off = np.abs(c.left[counted] - c.depth[counted])
+    np.testing.assert_allclose(c.residual[counted], -gap[counted], atol=1e-6)
+    np.testing.assert_array_equal(c.residual[too_small], 0.0)
+    off = np.abs(c.residual[counted] - c.depth[counted])
     # A ray from just inside the body may leave beside that of the vertex: a tenth in the weights.
     assert np.median(off) < 1e-5 and off.max() < 0.1 * model.body_edge.numpy().max()
 
@@ -74,8 +75,8 @@ def test_matching_vertices_both_get_the_whole_depth(stages, find_contacts, recor
     scene = Scene()
     for z in (0.0, 1.0 - depth):
         scene.add_body(box(1.0, 2), RUBBER, (0.0, 0.0, z))
-    _, work, _ = search(scene, stages, find_contacts, records)
-    s, z = work.s.numpy(), work.x.numpy()[:, 2]
+    _, work, _ = region(scene, stages, find_contacts, records)
+    s, z = work.surface.s.numpy(), work.x.numpy()[:, 2]
     # The rim of one block lies in the sides of the other: only the inner vertex is sure to be found
     # with its own direction along z.
     for side, sign in ((z > 0.49) & (z < 0.51), -1.0), ((z > 0.39) & (z < 0.41), 1.0):
@@ -91,8 +92,8 @@ def test_a_triangle_gives_way_by_its_weights_and_fixed_vertices_by_nothing(
     wide = box((2.0, 2.0, 1.0), 1)
     scene.add_body(wide, RUBBER, (0.0, 0.0, -0.5), fixed=[7])
     scene.add_body(box(0.2, 1), RUBBER, (0.3, 0.1, 0.1 - 0.01))
-    model, work, c = search(scene, stages, find_contacts, records)
-    s = work.s.numpy()
+    model, work, c = region(scene, stages, find_contacts, records)
+    s = work.surface.s.numpy()
     np.testing.assert_array_equal(s[7], 0.0)
     free = displacements(c, model.n_vert)
     top = np.flatnonzero((wide.vertices[:, 2] > 0.0) & (np.arange(8) != 7))
@@ -106,8 +107,8 @@ def test_the_mask_holds_the_tets_that_touch_the_region(
     scene = Scene()
     for z in (0.0, 0.9):
         scene.add_body(jittered(1.0, 4), RUBBER, (0.0, 0.0, z))
-    model, work, _ = search(scene, stages, find_contacts, records)
-    region = np.linalg.norm(work.s.numpy(), axis=1) > 0.0
-    mask = work.mask.numpy()
-    np.testing.assert_array_equal(mask == 1, region[model.tets.numpy()].any(axis=1))
+    model, work, _ = region(scene, stages, find_contacts, records)
+    moving = np.linalg.norm(work.surface.s.numpy(), axis=1) > 0.0
+    mask = work.surface.mask.numpy()
+    np.testing.assert_array_equal(mask == 1, moving[model.tets.numpy()].any(axis=1))
     assert 0 < mask.sum() < model.n_tet

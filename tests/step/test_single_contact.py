@@ -1,11 +1,11 @@
-"""A vertex against a triangle: impulse.py in closed form, penalty and predicted forces too."""
+"""impulse.py and other_responses.py in closed form: a vertex against a triangle."""
 
 import numpy as np
 import pytest
 import warp as wp
 
-from warp_contact import NeoHookean, Penalty, PredictedForce, Scene, TetMesh
-from warp_contact.step import impulse, step
+from warp_contact import NeoHookean, Penalty, Scene, TetMesh
+from warp_contact.step import impulse, other_responses
 
 DT = 1e-3
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -47,8 +47,9 @@ def test_a_single_contact_is_the_inelastic_collision_of_the_text_books(
     want[who] += (a / mass)[:, None] * p
     # float32 at velocities of order 1; positions 1e-7 off z = 0 turn up as a gap over DT.
     np.testing.assert_allclose(v1, want, atol=2e-4)
-    np.testing.assert_allclose(c.lam, normal, rtol=1e-4)
-    np.testing.assert_allclose(np.linalg.norm(c.slip, axis=1), drag, rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(c.normal_impulse, normal, rtol=1e-4)
+    rubbed = np.linalg.norm(c.friction_impulse, axis=1)
+    np.testing.assert_allclose(rubbed, drag, rtol=1e-4, atol=1e-9)
 
 
 def test_a_contact_that_opens_gets_nothing(rng, stages, find_contacts, records):
@@ -102,7 +103,7 @@ def test_a_penalty_impulse_is_stiffness_times_depth_less_damping(
     state.x.assign(x)
     find_contacts(model, work, state.x)
     v0 = state.v.numpy().astype(float)
-    impulse.push(model, state.v, work, response)
+    other_responses._push(model, state, work, response)
     who = np.array([4, 0, 1, 2])
     mass = model.mass.numpy().astype(float)[who]
     normal = DT * (response.stiffness * depth - response.damping * u[2])
@@ -112,7 +113,7 @@ def test_a_penalty_impulse_is_stiffness_times_depth_less_damping(
     want[who] += (a / mass)[:, None] * np.array([*(-drag * u[:2] / along), normal])
     # A depth of 0.01 in coordinates of order 1: 1e-5 of the impulse.
     np.testing.assert_allclose(state.v.numpy() - v0, want - v0, rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(records(work).lam, normal, rtol=1e-4)
+    np.testing.assert_allclose(records(work).normal_impulse, normal, rtol=1e-4)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2, 2.0])
@@ -125,9 +126,9 @@ def test_a_predicted_force_is_the_overlap_over_the_step_squared_and_the_weight(
     v0 = state.v.numpy().astype(float)
     ahead = state.x.numpy() + DT * v0
     ahead[4:, 2] -= overlap + DT * u[2]
-    ahead = wp.array(ahead, dtype=wp.vec3)
-    find_contacts(model, work, state.x, ahead)
-    impulse.push_apart(model, ahead, state.v, work)
+    work.x.assign(ahead)
+    find_contacts(model, work, state.x, work.x)
+    other_responses._push_apart(model, state, work)
     who = np.array([4, 0, 1, 2])
     mass = model.mass.numpy().astype(float)[who]
     w = (a * a / mass).sum()
@@ -137,19 +138,20 @@ def test_a_predicted_force_is_the_overlap_over_the_step_squared_and_the_weight(
     want[who] += (a / mass)[:, None] * np.array([*(-drag * u[:2] / along), normal])
     # An overlap of 0.002 in coordinates of order 1: 1e-4 of the impulse, 2 m/s.
     np.testing.assert_allclose(state.v.numpy(), want, atol=1e-3)
-    np.testing.assert_allclose(records(work).lam, normal, rtol=3e-4)
-    np.testing.assert_allclose(np.linalg.norm(records(work).slip, axis=1), drag, rtol=3e-4)
+    c = records(work)
+    np.testing.assert_allclose(c.normal_impulse, normal, rtol=3e-4)
+    np.testing.assert_allclose(np.linalg.norm(c.friction_impulse, axis=1), drag, rtol=3e-4)
 
 
 def test_a_step_with_predicted_forces_closes_a_single_gap_and_keeps_the_momentum(rng, stages):
     height = 0.001
     scene, a = tip_on_triangle(rng, 0.0, np.array([0.5, -1.0, -3.0]))
-    model, state, work = stages(scene, dt=DT)
+    model, state, work = stages(scene, dt=DT, unit=1e-9)
     x = state.x.numpy()
     x[4:, 2] += height
     state.x.assign(x)
     v0, mass = state.v.numpy().astype(float), model.mass.numpy().astype(float)[:, None]
-    step.step(model, state, work, PredictedForce(), 0, False, 1e-9)
+    other_responses.step_predicted(model, state, work, 0)
     x1, v1 = state.x.numpy().astype(float), state.v.numpy().astype(float)
     gap = a @ x1[[4, 0, 1, 2], 2]
     print(f"gap {gap:.1e} m, without contact {height - 3.0 * DT:.1e} m")
@@ -166,10 +168,10 @@ def test_predicted_forces_leave_a_vertex_in_the_skin_alone(rng, stages, find_con
     model, state, work = stages(scene, dt=DT)
     x = state.x.numpy()
     x[4:, 2] += 1e-3
-    ahead = wp.array(x, dtype=wp.vec3)
-    find_contacts(model, work, state.x, ahead)
+    work.x.assign(x)
+    find_contacts(model, work, state.x, work.x)
     v0 = state.v.numpy().copy()
-    impulse.push_apart(model, ahead, state.v, work)
+    other_responses._push_apart(model, state, work)
     c = records(work)
-    assert c.n == 1 and c.weight[0] > 0.0 and c.depth[0] < 0.0
+    assert c.n == 1 and c.inv_mass[0] > 0.0 and c.depth[0] < 0.0
     np.testing.assert_array_equal(state.v.numpy(), v0)

@@ -7,10 +7,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
-from verification.figure import LEVELS, MISSED
+from measure.figure import ORDER
 from verification.setup import Ask
-
-ORDER = *LEVELS, MISSED
 
 
 @pytest.fixture
@@ -26,7 +24,7 @@ def hold():
     def check(figures, level: str, but: dict[str, str] | None = None) -> dict[str, float]:
         found = list(figures)
         print(*found, sep="\n")
-        judged = [f for f in found if f.limits]
+        judged = [f for f in found if f.judged]
         assert judged, "nothing was judged"
         missed = []
         for f in judged:

@@ -9,9 +9,7 @@ from verification import bars, chain, orders
 def test_the_restitution_is_that_of_the_pressure_over_the_contact(name):
     impact = bars.IMPACTS[name]
     impulse = impact.pressure * impact.plateau
-    gained = impulse / (impact.lower.density * impact.lower.length)
-    if impact.upper:
-        gained += impulse / (impact.upper.density * impact.upper.length)
+    gained = sum(impulse / (bar.density * bar.length) for bar in impact.bars)
     # The pressure stays for the plateau, then falls by the same factor at each return of the wave.
     steps = round(impact.contact / impact.plateau)
     factor = impact.left ** (1.0 / max(steps - 1, 1))
@@ -46,7 +44,7 @@ def test_unequal_bars_of_many_elements_part_as_the_waves_say(name, ask, hold):
 
 
 def test_exact_contact_wants_vertices_that_face_each_other():
-    scene = bars.build(bars.IMPACTS["identical"], 10, (2, 3))
+    scene, _ = bars.build(bars.IMPACTS["identical"], 10, (2, 3))
     with pytest.raises(ValueError, match="face each other"):
         chain.collide(scene, 1e-3, [1])
 
@@ -65,6 +63,6 @@ def test_rest_converges_with_the_first_order_of_the_step(ask, hold):
 
 def test_an_error_that_does_not_fall_has_no_order():
     found = orders.order("", "", np.array([1.0, 0.5, 0.25]), [1.0, 0.2, 0.3], orders.SMOOTH)
-    assert found.level == "-"
+    assert found.level == "missed"
     exact = orders.order("", "", np.array([1.0, 0.5, 0.25]), [1.0, 0.5, 0.25], orders.SMOOTH)
     assert exact.value == pytest.approx(1.0) and exact.level == "best"

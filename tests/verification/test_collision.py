@@ -4,7 +4,7 @@ import pytest
 from verification import collision
 
 
-@pytest.mark.parametrize("ratio", collision.RATIOS)
+@pytest.mark.parametrize("ratio", collision.DENSITIES)
 @pytest.mark.parametrize("way", collision.WAYS)
 def test_blocks_keep_their_momenta_and_gain_no_energy(way, ratio, ask, hold):
-    hold(collision.collide(ask, (3, 5), way, ratio), "excellent")
+    hold(collision.hit(ask, (3, 5), way, ratio), "excellent")

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 import warp as wp
-from verification import facets, unweighted
+from verification import facets
+
+from warp_contact.kernels.narrow_phase.contact import Contact
 
 
 @pytest.mark.parametrize("ratio", facets.RATIOS)
@@ -19,7 +21,7 @@ def test_without_weights_the_force_jumps_while_a_block_slides(ratio, ask):
     ripple = [f for f in found if f.name.startswith("ripple of the normal")]
     on, off = ripple[0], ripple[1:]
     assert on.level in ("best", "excellent")
-    assert [f.case.split(", ")[1] for f in off] == list(unweighted.OFF)
+    assert [f.case.split(", ")[1] for f in off] == [facets.CLOSEST, facets.EQUAL]
     # Measured 4 to 15 times; the rest leaves room for another order of rounding.
     assert all(f.value > 2.5 * on.value for f in off)
     jump = [f.value for f in found if f.name.startswith("largest jump")]
@@ -27,20 +29,20 @@ def test_without_weights_the_force_jumps_while_a_block_slides(ratio, ask):
     assert min(jump[1:]) > 1.3 * jump[0]
 
 
-@pytest.mark.parametrize("how", unweighted.OFF)
+@pytest.mark.parametrize("how", (facets.CLOSEST, facets.EQUAL))
 def test_weights_are_switched_off_for_vertices_on_bodies_and_on_again_after(how):
-    coef = [[1.0, 0.0, -0.2, -0.5, -0.3], [1.0, 0.0, 0.0, 0.0, 0.0], [0.0] * 5]
-    out = wp.array(coef, dtype=float)
-    pair = wp.array([[0, 1], [0, 2], [0, 1]], dtype=wp.vec2i)  # the second is on a plane
+    records = np.zeros(3, dtype=Contact.numpy_dtype())
+    records["coef"] = [[1.0, 0.0, -0.2, -0.5, -0.3], [1.0, 0.0, 0.0, 0.0, 0.0], [0.0] * 5]
+    records["pair"] = [[0, 1], [0, 2], [0, 1]]  # the second is on a plane
+    contacts = wp.array(records, dtype=Contact)
     count = wp.array([3], dtype=int)
-    wp.launch(
-        unweighted.level, 3, inputs=[how == unweighted.CLOSEST, 2, count, pair], outputs=[out]
-    )
+    wp.launch(facets.level, 3, inputs=[how == facets.CLOSEST, 2, count], outputs=[contacts])
     third = 1.0 / 3.0
-    first = [0.0, -1.0, 0.0] if how == unweighted.CLOSEST else [-third] * 3
-    np.testing.assert_allclose(out.numpy(), [[1.0, 0.0, *first], *coef[1:]], rtol=1e-6)
+    first = [0.0, -1.0, 0.0] if how == facets.CLOSEST else [-third] * 3
+    want = [[1.0, 0.0, *first], *records["coef"][1:]]
+    np.testing.assert_allclose(contacts.numpy()["coef"], want, rtol=1e-6)
 
-    before = unweighted.depth.vertex_contacts
-    with unweighted.switched_off(how):
-        assert unweighted.depth.vertex_contacts is not before
-    assert unweighted.depth.vertex_contacts is before
+    before = facets.narrow_phase.count_contacts
+    with facets.switched_off(how):
+        assert facets.narrow_phase.count_contacts is not before
+    assert facets.narrow_phase.count_contacts is before

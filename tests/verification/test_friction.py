@@ -6,16 +6,16 @@ from verification import friction
 
 @pytest.mark.parametrize("mu", [0.0, 0.25, 0.45])
 def test_a_block_slides_down_a_slope_as_coulomb_says(mu, ask, hold):
-    hold(friction.slide(ask, friction.SLOPE, mu), "excellent")
+    hold(friction.slope(ask, friction.SLOPE, mu), "excellent")
 
 
 def test_a_block_just_below_the_limit_slides_slowly(ask, hold):
-    hold(friction.slide(ask, friction.SLOPE, 0.49), "excellent")
+    hold(friction.slope(ask, friction.SLOPE, 0.49), "excellent")
 
 
 @pytest.mark.parametrize("mu", [0.51, 0.8])
 def test_a_block_above_the_limit_stays(mu, ask, hold):
-    hold(friction.stick(ask, friction.SLOPE, mu), "excellent")
+    hold(friction.slope(ask, friction.SLOPE, mu), "excellent")
 
 
 @pytest.mark.parametrize(("speed", "mu"), [(1.0, 0.1), (2.0, 0.3)])

@@ -2,22 +2,17 @@
 
 import numpy as np
 import pytest
-from verification import columns, patch
-from verification.setup import Pose
-
-import warp_contact as wc
+from verification import patch
+from verification.setup import Ask, Pose
 
 
 def test_the_start_is_the_exact_solution():
-    pose = Pose(True)
-    scene = columns.build(*patch.pair((3, 2), False, "structured", 0), patch.PUSH, pose)
-    sim = wc.Simulation(scene)
-    sim.state.x.assign(patch.solution(scene, pose).astype(np.float32))
-    for body in scene.bodies:
-        # Positions of order 1 in float32 against a strain of 0.01.
-        np.testing.assert_allclose(columns.axial(sim, body, pose), 1e4, rtol=1e-3)
-    top, bottom = columns.faces(sim, pose)
-    np.testing.assert_allclose([top.mean(), bottom.mean()], 0.495, atol=1e-6)
+    pile = patch.pair((3, 2), False, Pose(True))
+    sim = pile.simulate(Ask(), patch.EXACT)
+    # Positions of order 1 in float32 against a strain of 0.01.
+    np.testing.assert_allclose(pile.pressures(sim, *sim.scene.bodies), 1e4, rtol=1e-3)
+    ends = [pile.face(sim, 0, 1).mean(), pile.face(sim, 1, -1).mean()]
+    np.testing.assert_allclose(ends, 0.495, atol=1e-6)
 
 
 @pytest.mark.parametrize("cells", [(6, 4), (4, 6)])

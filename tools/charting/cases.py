@@ -9,8 +9,7 @@ coefficient for all.
 from functools import cache
 
 import numpy as np
-from verification import collision, hertz
-from verification import ladder as mass_ladder
+from verification import collision, hertz, weight
 from verification.setup import G, on_face
 
 import warp_contact as wc
@@ -158,7 +157,7 @@ def free(quick: bool) -> Panel:
     """A6: momentum, and with it energy."""
 
     def build() -> wc.Scene:
-        return collision.build((3, 5), "head-on", DENSER)
+        return collision.thrown((3, 5), "head-on", DENSER)
 
     frames = round(FREE_TIME * FREE_FPS)
     title = "A6 free collision 1:10\n{} [of that at the start]"
@@ -205,7 +204,7 @@ def met(panel: Panel, motion: Motion) -> None:
 # and their damping takes 1.25 s until less than 0.01 % of the weight is left of that error.
 
 RATIO = 100.0
-EDGE, LIGHT = mass_ladder.EDGE, mass_ladder.DENSITY  # [m], [kg/m^3]
+EDGE, LIGHT = weight.EDGE, weight.DENSITY  # [m], [kg/m^3]
 LADDER_CELLS = 2, 3
 LADDER_FPS, LADDER_TIME = 240, 1.5  # [1/s], [s]
 LADDER_ZETA = 0.1  # a small part of the rate at which the light cube alone would be damped
@@ -222,13 +221,13 @@ def ladder(quick: bool) -> Panel:
         for k, density in enumerate((LIGHT, RATIO * LIGHT)):
             mesh = wc.box(EDGE, LADDER_CELLS[k])
             rubber = wc.NeoHookean(young, 0.0, density, 2.0 * LADDER_ZETA / omega)
-            place = (0.0, 0.0, k * (EDGE + mass_ladder.GAP))
+            place = (0.0, 0.0, k * (EDGE + weight.APART))
             held = None if k else on_face(mesh, 2, -1)
             scene.add_body(mesh, rubber, place, fixed=held)
         return scene
 
     def start(scene: wc.Scene) -> np.ndarray:
-        return np.concatenate(mass_ladder.static(scene, young, RATIO))
+        return np.concatenate(weight.cubes(RATIO, young).static(scene))
 
     frames = round(LADDER_TIME * LADDER_FPS)
     title = f"A7m heavy on light 1:{RATIO:g}\nforce and its ripple [of the weight]"

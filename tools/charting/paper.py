@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 import warp as wp
-from checks.scenes import in_edges
+from verification.scenes import in_edges
 
 import warp_contact as wc
 from charting import ours

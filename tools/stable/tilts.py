@@ -1,14 +1,14 @@
 """Blocks that hit each other with corners and edges at random tilts: what no one chose.
 
-The collisions of tools/checks/collision.py, with rotation, place, cells and stiffness drawn anew
-for each number. Corners slide over facets that they bend, and pass each other tip on tip.
+The collisions of ``verification/collision.py``, with rotation, place, cells and stiffness drawn
+anew for each number. Corners slide over facets that they bend, and pass each other tip on tip.
 """
 
 from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
-from checks import collision
+from verification import collision
 
 from stable.case import Case
 from stable.watch import Setting

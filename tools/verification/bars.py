@@ -14,15 +14,14 @@ the lumped mesh on the way. The same in exact contact on the same mesh, shown be
 of the error is due to the contact; four times as many elements leave a part of it.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from measure.figure import Figure, Figures, relative, rms, zero
 
 import warp_contact as wc
 from verification import chain
-from verification.figure import Figure, relative, rms, zero
-from verification.setup import Ask
+from verification.setup import Ask, masses, watch
 
 FRAMES = 80  # in the time that a wave takes there and back
 GAP = 0.05  # at the start, of what the bars travel in that time
@@ -47,76 +46,55 @@ class Bar:
     speed: float
 
     @property
-    def c(self) -> float:
-        """Wave speed [m/s]."""
-        return float(np.sqrt(self.young / self.density))
-
-    @property
     def z(self) -> float:
         """Impedance [Pa s/m]."""
-        return self.density * self.c
+        return float(np.sqrt(self.young * self.density))
 
     @property
     def round_trip(self) -> float:
         """How long a wave takes there and back [s]."""
-        return 2.0 * self.length / self.c
+        return float(2.0 * self.length * np.sqrt(self.density / self.young))
 
 
 @dataclass(frozen=True)
 class Impact:
-    """Two bars, the lower first; no second one for a wall below the first.
+    """What meets what, and what comes of it."""
 
-    Attributes:
-        lower, upper: the bars
-        contact: how long they touch [s]
-        e: coefficient of restitution of the mean velocities
-        left: pressure just before they part, of the first; (z2 - z1) / (z2 + z1) for each time that
-            a wave came back through the upper bar until then
-    """
-
-    lower: Bar
-    upper: Bar | None
-    contact: float
-    e: float
+    bars: tuple[Bar, ...]  # from below; a single one falls onto a wall
+    contact: float  # how long they touch [s]
+    e: float  # coefficient of restitution of the mean velocities
+    # Pressure just before they part, of the first: (z2 - z1) / (z2 + z1) for each time that a wave
+    # came back through the upper bar until then.
     left: float = 1.0
-
-    @property
-    def pressure(self) -> float:
-        """At the interface while both ends have heard nothing of their far ends [Pa]."""
-        if self.upper is None:
-            return self.lower.z * abs(self.lower.speed)
-        z1, z2 = self.lower.z, self.upper.z
-        return z1 * z2 * (self.lower.speed - self.upper.speed) / (z1 + z2)
 
     @property
     def approach(self) -> float:
         """Relative speed [m/s]."""
-        return abs(self.lower.speed - (self.upper.speed if self.upper else 0.0))
+        return abs(self.bars[0].speed - sum(bar.speed for bar in self.bars[1:]))
+
+    @property
+    def pressure(self) -> float:
+        """At the interface while both ends have heard nothing of their far ends [Pa]."""
+        return self.approach / sum(1.0 / bar.z for bar in self.bars)
 
     @property
     def plateau(self) -> float:
         """How long the pressure stays [s]: until the first wave is back."""
-        bars = [self.lower] + ([self.upper] if self.upper else [])
-        return min(bar.round_trip for bar in bars)
+        return min(bar.round_trip for bar in self.bars)
 
     @property
     def frame(self) -> float:
         """Duration of a frame [s]."""
-        return self.lower.round_trip / FRAMES
-
-    @property
-    def touch(self) -> float:
-        """From the start until the rest shapes touch [s]."""
-        return GAP * self.plateau
+        return self.bars[0].round_trip / FRAMES
 
 
-FIRST, ROUND = (1.0, 1e6, 1000.0, 0.1), 2.0 / np.sqrt(1e3)  # bar 1 of the pairs, its 2 L / c
+FIRST, ROUND = Bar(1.0, 1e6, 1000.0, 0.1), 2.0 / np.sqrt(1e3)  # bar 1 of the pairs, its 2 L / c
 IMPACTS = {
-    "on a wall": Impact(Bar(10.0, 900.0, 1.0, -0.1), None, 2.0 / 3.0, 1.0),
-    "identical": Impact(Bar(*FIRST), Bar(1.0, 1e6, 1000.0, -0.1), ROUND, 1.0),
-    "L2 = 2 L1": Impact(Bar(*FIRST), Bar(2.0, 1e6, 1000.0, 0.0), ROUND, 0.5),
-    "E2 = 16 E1": Impact(Bar(*FIRST), Bar(1.0, 16e6, 1000.0, 0.0), ROUND, 0.7408, 0.6**3),
-    "z1 = z2": Impact(Bar(*FIRST), Bar(1.0, 4e6, 250.0, 0.0), 0.25 * ROUND, 0.25),
+    "on a wall": Impact((Bar(10.0, 900.0, 1.0, -0.1),), 2.0 / 3.0, 1.0),
+    "identical": Impact((FIRST, Bar(1.0, 1e6, 1000.0, -0.1)), ROUND, 1.0),
+    "L2 = 2 L1": Impact((FIRST, Bar(2.0, 1e6, 1000.0, 0.0)), ROUND, 0.5),
+    "E2 = 16 E1": Impact((FIRST, Bar(1.0, 16e6, 1000.0, 0.0)), ROUND, 0.7408, 0.6**3),
+    "z1 = z2": Impact((FIRST, Bar(1.0, 4e6, 250.0, 0.0)), 0.25 * ROUND, 0.25),
 }
 ELEMENTS = 40  # along a bar of length L1
 # In cells of 6 mm single precision of positions of 2 m strains by 2e-5. At a strain of 0.3 % that
@@ -125,7 +103,7 @@ ELEMENTS = 40  # along a bar of length L1
 UNEQUAL, FINE, FASTER = ("L2 = 2 L1", "E2 = 16 E1"), 160, 5
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Every impact; the full run adds coarser and finer bars, and cells that differ."""
     for name, impact in IMPACTS.items():
         yield from hit(f"A4 {name}, N = {ELEMENTS}", impact, ask, ELEMENTS)
@@ -140,85 +118,71 @@ def run(ask: Ask) -> Iterator[Figure]:
 
 def faster(impact: Impact) -> Impact:
     """The same at ``FASTER`` times the speed."""
-    lower, upper = (replace(b, speed=FASTER * b.speed) for b in (impact.lower, impact.upper))
-    return replace(impact, lower=lower, upper=upper)
+    return replace(impact, bars=tuple(replace(b, speed=FASTER * b.speed) for b in impact.bars))
 
 
-def build(impact: Impact, n: int, across: tuple[int, int]) -> wc.Scene:
-    """Bars along z in cubic cells (those of the upper bar finer where ``across`` says so)."""
+def build(impact: Impact, n: int, across: tuple[int, int]) -> tuple[wc.Scene, float]:
+    """Bars along z in cubic cells (those of the upper bar finer where ``across`` says so).
+
+    Also returns their width [m].
+    """
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
-    cell = impact.lower.length / n
-    width = cell * across[0]
-    gap = impact.approach * impact.touch
-    bars = [impact.lower] + ([impact.upper] if impact.upper else [])
-    for k, bar in enumerate(bars):
+    width = impact.bars[0].length / n * across[0]
+    gap = impact.approach * GAP * impact.plateau
+    for k, bar in enumerate(impact.bars):
         cells = (across[k], across[k], round(bar.length / width * across[k]))
         mesh = wc.box((width, width, bar.length), cells)
-        wall = impact.upper is None
-        low = gap if wall else (-bar.length, gap)[k]
-        material = wc.Corotated(bar.young, 0.0, bar.density)
+        low = -bar.length if k == 0 and len(impact.bars) > 1 else gap
         place = (0.0, 0.0, low + 0.5 * bar.length)
-        scene.add_body(mesh, material, place, velocity=(0.0, 0.0, bar.speed), label=f"bar{k}")
-    if impact.upper is None:
+        material = wc.Corotated(bar.young, 0.0, bar.density)
+        scene.add_body(mesh, material, place, velocity=(0.0, 0.0, bar.speed))
+    if len(impact.bars) == 1:
         scene.add_plane((0.0, 0.0, 1.0), 0.0)
-    return scene
+    return scene, width
 
 
 @dataclass
 class History:
-    """What an impact showed.
+    """What an impact showed in each frame; time 0 is the moment at which the rest shapes touch."""
 
-    Attributes:
-        time: ends of the frames [s], shape (n,)
-        pressure: mean of each frame [Pa], shape (n,)
-        energy: of that at the start, shape (n,)
-        steps: of each frame, shape (n,)
-        e: coefficient of restitution
-    """
-
-    time: np.ndarray
-    pressure: np.ndarray
-    energy: np.ndarray
+    pressure: np.ndarray  # mean of the frame [Pa]
+    energy: np.ndarray  # at its end, of that at the start
     steps: np.ndarray
-    e: float
+    time: np.ndarray  # its end [s]
+    e: float  # coefficient of restitution
 
 
 def record(impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)) -> History:
-    """Run an impact; time 0 is the moment at which the rest shapes touch."""
-    scene = build(impact, n, across)
-    width = impact.lower.length / n * across[0]
+    """Run an impact."""
+    scene, width = build(impact, n, across)
     # A contact as stiff as an element of the bar, five times: a penalty that is not seen.
-    respond = ask.respond(5.0 * impact.lower.young * width / across[0])
+    respond = ask.respond(5.0 * impact.bars[0].young * width / across[0])
     sim = wc.Simulation(scene, respond, fps=1.0 / impact.frame)
-    energy = sim.measure().energy
-    last = impact.touch + impact.contact + AFTER * impact.lower.round_trip
-    rows, steps = [], []
-    for _ in sim.frames(int(np.ceil(last / impact.frame))):
+    energy, touch = sim.measure().energy, GAP * impact.plateau
+    last = touch + impact.contact + AFTER * impact.bars[0].round_trip
+
+    def look() -> tuple[float, ...]:
         now = sim.measure()
         pressure = sum(now.forces.values()) / width**2
-        rows.append((sim.time - impact.touch, pressure, now.energy / energy))
-        steps.append(sim.substeps)
-    e = restitution(impact, scene, sim.model.mass.numpy().astype(float), sim.velocities())
-    return History(*np.array(rows).T, steps=np.array(steps), e=e)
+        return pressure, now.energy / energy, sim.substeps, sim.time - touch
+
+    found = watch(sim, int(np.ceil(last / impact.frame)) * impact.frame, look).T
+    return History(*found, restitution(impact, scene, masses(sim), sim.velocities()))
 
 
-def exact(impact: Impact, n: int, across: tuple[int, int], steps: np.ndarray) -> History:
+def exact(impact: Impact, n: int, across: tuple[int, int], found: History) -> History:
     """The same impact of two bars in exact contact on the same mesh, in as many steps."""
-    scene = build(impact, n, across)
-    width = impact.lower.length / n * across[0]
-    seen = chain.collide(scene, impact.frame, steps)
-    time = impact.frame * np.arange(1, len(steps) + 1) - impact.touch
-    pressure = seen.impulse / (impact.frame * width**2)
-    e = restitution(impact, scene, seen.mass, seen.v)
-    return History(time, pressure, seen.energy, steps, e)
+    scene, width = build(impact, n, across)
+    impulse, energy, mass, v = chain.collide(scene, impact.frame, found.steps.astype(int))
+    pressure, e = impulse / (impact.frame * width**2), restitution(impact, scene, mass, v)
+    return replace(found, pressure=pressure, energy=energy, e=e)
 
 
 def restitution(impact: Impact, scene: wc.Scene, mass: np.ndarray, v: np.ndarray) -> float:
     """Coefficient of restitution of the mean velocities, from those of the vertices."""
     body = np.repeat(np.arange(len(scene.bodies)), [len(b.x) for b in scene.bodies])
     speeds = np.bincount(body, mass * v[:, 2]) / np.bincount(body, mass)
-    below, above = speeds if impact.upper else (0.0, speeds[0])
-    return float(abs(above - below) / impact.approach)
+    return float(abs(speeds[-1] - sum(speeds[:-1])) / impact.approach)
 
 
 def release(found: History, impact: Impact) -> float:
@@ -234,12 +198,9 @@ def release(found: History, impact: Impact) -> float:
     return float(found.time[on[-1]] - (1.0 - part) * impact.frame)
 
 
-def hit(
-    label: str, impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)
-) -> Iterator[Figure]:
+def hit(label: str, impact: Impact, ask: Ask, n: int, across=(1, 1)) -> Figures:
     """Restitution, pressure, release and energies of an impact."""
-    found = record(impact, ask, n, across)
-    round_trip = impact.lower.round_trip
+    found, round_trip = record(impact, ask, n, across), impact.bars[0].round_trip
     yield relative(label, "restitution", found.e, impact.e, RESTITUTION)
     inner = (found.time > 0.15 * impact.plateau) & (found.time < 0.85 * impact.plateau)
     p = found.pressure[inner] / impact.pressure
@@ -249,7 +210,7 @@ def hit(
     error = (off - impact.contact) / round_trip
     yield Figure(label, "end of the contact [s]", off, impact.contact, error, RELEASE)
     if impact.e < 1.0:
-        there = release(exact(impact, n, across, found.steps), impact)
+        there = release(exact(impact, n, across, found), impact)
         error = (there - impact.contact) / round_trip
         name = "end, exact contact on the same mesh [s]"
         yield Figure(label, name, there, impact.contact, error)
@@ -258,7 +219,8 @@ def hit(
     later = found.time > impact.contact + 0.1 * round_trip
     after = found.pressure[later].max() / impact.pressure
     yield zero(label, "largest pressure afterwards [of the plateau]", after, SUCTION)
-    lost = 1.0 - found.energy[-1]
-    yield Figure(label, "energy at the end [of that at the start]", 1.0 - lost, 1.0, lost, LOSS)
+    left = found.energy[-1]
+    name = "energy at the end [of that at the start]"
+    yield Figure(label, name, left, 1.0, 1.0 - left, LOSS)
     rise = max(found.energy.max() - 1.0, 0.0)
     yield zero(label, "rise of the energy [of that at the start]", rise, GAIN)

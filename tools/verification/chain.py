@@ -10,56 +10,39 @@ that what differs from the simulator is due to these and what does not is due to
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 import warp_contact as wc
+from verification.setup import gradients, on_face
 from warp_contact.scene.scene import Body
 
 
-@dataclass
-class Run:
-    """What the bars did.
+def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> tuple[np.ndarray, ...]:
+    """Run two bars along z, the lower first, without gravity, in so many steps of each frame [s].
 
-    Attributes:
-        impulse: between the bars, of each frame [N s], shape (n,)
-        energy: at the ends of the frames, of that at the start, shape (n,)
-        mass: of the vertices of both bars [kg], shape (n_vert,)
-        v: velocities at the end [m/s], shape (n_vert, 3)
-    """
-
-    impulse: np.ndarray
-    energy: np.ndarray
-    mass: np.ndarray
-    v: np.ndarray
-
-
-def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> Run:
-    """Run two bars along z, the lower first and Poisson ratio 0, without gravity.
-
-    Args:
-        scene: the bars
-        frame: duration of a frame [s]
-        steps: of each frame
+    Returns the impulses between the bars in each frame [N s], the energy after it, of that at the
+    start, the masses of the vertices [kg] and their velocities at the end [m/s].
 
     Raises:
         ValueError: the vertices at the ends do not face each other
     """
     lower, upper = scene.bodies
-    below, above, start = facing(lower, upper)
+    below, above, start = ends(lower, upper)
     mass = np.concatenate([masses(lower), masses(upper)])
     reduced = 1.0 / (1.0 / mass[below] + 1.0 / mass[above])
-    k = np.concatenate([stiffness(lower), stiffness(upper)])
+    grad = np.concatenate([gradients(b.x, b.mesh.tets) for b in scene.bodies])
+    stiff = np.concatenate([b.material.youngs_modulus * b.mesh.volumes for b in scene.bodies])
     tets = np.concatenate([lower.mesh.tets, upper.mesh.tets + len(lower.x)])
-    at = (3 * tets[:, :, None] + np.arange(3)).reshape(-1, 12)  # where a tet's u are among all
+    at = (3 * tets[:, :, None] + np.arange(3)).ravel()  # where a tet's forces are among all
     v = np.concatenate([lower.v, upper.v])
     u = np.zeros_like(v)
 
     def pull() -> np.ndarray:
-        """K u [N], shape (n_vert, 3)."""
-        of_tets = np.einsum("tij,tj->ti", k, u.ravel()[at])
-        return np.bincount(at.ravel(), of_tets.ravel(), u.size).reshape(u.shape)
+        """K u [N], shape (n_vert, 3): that of the energy V E eps : eps / 2, eps = sym(grad u)."""
+        strain = np.einsum("tci,tcj->tij", u[tets], grad)
+        strain = 0.5 * (strain + strain.swapaxes(1, 2)) * stiff[:, None, None]
+        return np.bincount(at, (grad @ strain).ravel(), u.size).reshape(u.shape)
 
     def energy() -> float:
         return 0.5 * float(mass @ (v**2).sum(axis=1) + (u * pull()).sum())
@@ -76,40 +59,19 @@ def collide(scene: wc.Scene, frame: float, steps: Sequence[int]) -> Run:
             u += h * v
             impulse += j.sum()
         rows.append((impulse, energy() / first))
-    return Run(*np.array(rows).T, mass, v)
+    return *np.array(rows).T, mass, v
 
 
-def facing(lower: Body, upper: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices at the upper end of one bar and the lower of the other, and their gaps [m].
-
-    Those of the upper bar count on from those of the lower one.
-    """
-    ends = []
-    for body, side in ((lower, 1.0), (upper, -1.0)):
-        z = side * body.x[:, 2]
-        at = np.flatnonzero(z > z.max() - 1e-6 * np.ptp(z))
-        ends.append(at[np.lexsort(body.x[at, :2].T)])
-    a, b = lower.x[ends[0]], upper.x[ends[1]]
-    if a.shape != b.shape or not np.allclose(a[:, :2], b[:, :2]):
+def ends(lower: Body, upper: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices at the ends that meet, those of the upper bar counted on, and their gaps [m]."""
+    below = np.flatnonzero(on_face(lower.mesh, 2, 1))
+    above = np.flatnonzero(on_face(upper.mesh, 2, -1))
+    if len(below) != len(above) or not np.allclose(lower.x[below, :2], upper.x[above, :2]):
         raise ValueError("the vertices at the ends of the bars do not face each other")
-    return ends[0], ends[1] + len(lower.x), b[:, 2] - a[:, 2]
+    return below, above + len(lower.x), upper.x[above, 2] - lower.x[below, 2]
 
 
 def masses(body: Body) -> np.ndarray:
     """A quarter of each tet at each of its corners [kg], shape (n_vert,)."""
     quarter = 0.25 * body.material.density * body.mesh.volumes
     return np.bincount(body.mesh.tets.ravel(), np.repeat(quarter, 4), len(body.x))
-
-
-def stiffness(body: Body) -> np.ndarray:
-    """Linear stiffness of each tet for a Poisson ratio of 0 [N/m], shape (n_tet, 12, 12).
-
-    The energy is V E eps : eps / 2 with the strain eps = sym(grad u).
-    """
-    corners = body.x[body.mesh.tets]
-    grad = np.linalg.inv(corners[:, 1:] - corners[:, :1])  # (t, xyz, corners 1 to 3)
-    grad = np.concatenate([-grad.sum(axis=2, keepdims=True), grad], axis=2)
-    both = np.einsum("tca,tcb->tab", grad, grad)
-    k = np.einsum("tab,cd->tacbd", both, np.eye(3)) + np.einsum("tda,tcb->tacbd", grad, grad)
-    k *= 0.5 * body.material.youngs_modulus * body.mesh.volumes[:, None, None, None, None]
-    return k.reshape(-1, 12, 12)

@@ -1,86 +1,132 @@
-"""Two prismatic columns along a local z axis, held at their outer ends, in contact inside."""
+"""Columns on each other along a local z axis: their scene, their exact state, their stresses.
 
+    u(s) = -(p s + rho G (L s - s^2 / 2)) / E
+
+under a pressure p on top, s from the foot of a column of length L. The Poisson ratio is 0: a fixed
+corotated column is then exactly linear in its axial stretch, P = E (F - R) with F = R S
+(Stomakhin et al. 2012).
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 import warp_contact as wc
-from verification.setup import Pose, block, on_face
-from verification.stress import first_piola
+from verification.relax import step_rate
+from verification.setup import ALIGNED, Ask, Pose, block, forces, gradients, on_face
+from warp_contact.scene.scene import Body
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column.
-
-    Attributes:
-        young: [Pa]; the Poisson ratio is 0
-        length: [m]
-        section: [m], shape (2,)
-        cells: shape (3,)
-        density: [kg/m^3]
-        damping: of the material [s]
-        mesh: one of ``setup.MESHES``
-        seed: of the jittered mesh
-    """
+    """E [Pa], length [m], density [kg/m^3], cells, section [m], mesh with its seed, damping [s]."""
 
     young: float
     length: float
-    section: tuple[float, float]
-    cells: tuple[int, int, int]
     density: float
-    damping: float = 0.0
+    cells: tuple[int, int, int]
+    section: tuple[float, float] = (1.0, 1.0)
     mesh: str = "structured"
     seed: int = 0
-
-    @property
-    def rest(self) -> wc.TetMesh:
-        """Its mesh, about the origin."""
-        return block((*self.section, self.length), self.cells, self.mesh, self.seed)
-
-    @property
-    def material(self) -> wc.Corotated:
-        """Fixed corotated with nu = 0: exactly linear in the axial stretch."""
-        return wc.Corotated(self.young, 0.0, self.density, self.damping)
+    damping: float = 0.0
 
     @property
     def wave_speed(self) -> float:
         """Of the bar [m/s]."""
         return float(np.sqrt(self.young / self.density))
 
-
-def build(lower: Column, upper: Column, overlap: float, pose: Pose, gravity=0.0) -> wc.Scene:
-    """Base of the lower column at z = 0; the rest shapes overlap by ``overlap`` [m]."""
-    scene = wc.Scene(gravity=pose.out((0.0, 0.0, -gravity)), friction=0.0)
-    low = lower.rest
-    scene.add_body(
-        low,
-        lower.material,
-        pose.out((0.0, 0.0, 0.5 * lower.length)),
-        pose.q,
-        fixed=on_face(low, 2, -1),
-        label="lower",
-    )
-    high = upper.rest
-    scene.add_body(
-        high,
-        upper.material,
-        pose.out((0.0, 0.0, lower.length - overlap + 0.5 * upper.length)),
-        pose.q,
-        fixed=on_face(high, 2, 1),
-        label="upper",
-    )
-    return scene
+    @property
+    def slowest(self) -> float:
+        """Frequency of its slowest mode, held at one end [1/s]."""
+        return 0.5 * np.pi * self.wave_speed / self.length
 
 
-def faces(sim: wc.Simulation, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
-    """Heights z [m] of the vertices of the upper face of the lower column and the one above."""
-    lower, upper = sim.scene.bodies
-    top = pose.back(sim.positions(lower))[on_face(lower.mesh, 2, 1), 2]
-    bottom = pose.back(sim.positions(upper))[on_face(upper.mesh, 2, -1), 2]
-    return top, bottom
+@dataclass(frozen=True)
+class Pile:
+    """Columns from below, from the height ``base`` [m], with a gap [m] or overlap (below 0).
+
+    The foot of the first is held, and the top of the last where the pile is clamped; gravity
+    [m/s^2] acts along -z.
+    """
+
+    columns: Sequence[Column]
+    gap: float
+    base: float = 0.0
+    clamped: bool = False
+    pose: Pose = ALIGNED
+    gravity: float = 0.0
+    friction: float = 0.0
+
+    def build(self) -> wc.Scene:
+        """The rest shapes."""
+        scene = wc.Scene(self.pose.out((0.0, 0.0, -self.gravity)), self.friction)
+        foot = self.base
+        for c in self.columns:
+            mesh = block((*c.section, c.length), c.cells, c.mesh, c.seed)
+            held = on_face(mesh, 2, -1) & (c is self.columns[0])
+            held |= on_face(mesh, 2, 1) & (self.clamped and c is self.columns[-1])
+            material = wc.Corotated(c.young, 0.0, c.density, c.damping)
+            place = self.pose.out((0.0, 0.0, foot + 0.5 * c.length))
+            scene.add_body(mesh, material, place, self.pose.q, fixed=held)
+            foot += c.length + self.gap
+        return scene
+
+    def simulate(self, ask: Ask, load: float | None = None) -> wc.Simulation:
+        """A simulation in frames of about one step; a penalty has 100 E A / L in all.
+
+        It starts at rest under a pressure ``load`` [Pa] on top, or in the rest shapes.
+        """
+        first, height = self.columns[0], sum(c.length for c in self.columns)
+        contacts = sum((c.cells[0] + 1) * (c.cells[1] + 1) for c in self.columns[:2])
+        stiffness = 100.0 * first.young * first.section[0] * first.section[1] / height / contacts
+        edge = min(min(c.section[0] / c.cells[0], c.length / c.cells[2]) for c in self.columns)
+        rate = step_rate(edge, max(c.wave_speed for c in self.columns))
+        sim = wc.Simulation(self.build(), ask.respond(stiffness), fps=rate)
+        if load is not None:
+            x = np.concatenate(self.static(sim.scene, load))
+            sim.state.x.assign(x.astype(np.float32))
+        return sim
+
+    def static(self, scene: wc.Scene, load: float = 0.0) -> list[np.ndarray]:
+        """Positions [m] of each body under the weights and a pressure ``load`` [Pa] on top.
+
+        Neighbours touch, or keep a gap above zero.
+        """
+        above = load + self.gravity * sum(c.density * c.length for c in self.columns)
+        foot, positions = self.base, []
+        for body, c in zip(scene.bodies, self.columns, strict=True):
+            weight = self.gravity * c.density
+            above -= weight * c.length
+            x = self.pose.back(body.x)
+            s = x[:, 2] - x[:, 2].min()
+            x[:, 2] = foot + s - (above * s + weight * (c.length * s - 0.5 * s**2)) / c.young
+            positions.append(self.pose.out(x))
+            sunk = (above * c.length + 0.5 * weight * c.length**2) / c.young
+            foot += c.length - sunk + max(self.gap, 0.0)
+        return positions
+
+    def face(self, sim: wc.Simulation, k: int, side: int) -> np.ndarray:
+        """Heights z [m] of the vertices at the lower (-1) or upper (1) end of column ``k``."""
+        body = sim.scene.bodies[k]
+        return self.pose.back(sim.positions(body))[on_face(body.mesh, 2, side), 2]
+
+    def pressures(self, sim: wc.Simulation, *bodies: Body) -> np.ndarray:
+        """Axial stress of each tet of some columns [Pa], pressure counted positive."""
+        at = [stress(body, self.pose.back(sim.positions(body))) for body in bodies]
+        return -np.concatenate(at)[:, 2, 2]
 
 
-def axial(sim: wc.Simulation, body, pose: Pose) -> np.ndarray:
-    """Axial stress of each tet [Pa], pressure counted positive."""
-    return -first_piola(body, pose.back(sim.positions(body)))[:, 2, 2]
+def stress(body: Body, x: np.ndarray) -> np.ndarray:
+    """P [Pa] of each tet at ``x`` [m], in the axes of the mesh; in doubles, shape (m, 3, 3)."""
+    grad = gradients(body.mesh.vertices, body.mesh.tets)
+    f = np.einsum("tci,tcj->tij", x[body.mesh.tets].astype(float), grad)
+    u, _, vt = np.linalg.svd(f)
+    return body.material.youngs_modulus * (f - u @ vt)
+
+
+def between(sim: wc.Simulation) -> np.ndarray:
+    """Forces [N] between neighbours, from below."""
+    labels = [body.label for body in sim.scene.bodies]
+    return forces(sim, *pairwise(labels))

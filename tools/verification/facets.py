@@ -6,21 +6,27 @@ The claim of Spillmann and Teschner (2005) is a force that stays continuous whil
 from facet to facet. The coarse block is flat and fixed, so that the answer is exact; or deformable,
 and then the height depends on where the load is and is not judged.
 
-What makes the force continuous are the weights of eqs. (1) and (2). They are switched off in turn
-on the deformable block, where they matter: on a flat rigid one any weights give the same. These
-figures are shown, next to the same with the weights as reference, and have no limits.
+What makes the force continuous are the weights of eqs. (1) and (2) and of the impulses: the
+barycentric ones of a contact point in its triangle. They are switched off in turn on the deformable
+block, where they matter: on a flat rigid one any weights give the same. All is then on the closest
+vertex, or the same on each, right after contacts were found. These figures are shown, next to the
+same with the weights as reference, and have no limits.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from unittest.mock import patch
 
 import numpy as np
+import warp as wp
+from measure.figure import Figure, Figures, relative, rms, zero
 
 import warp_contact as wc
-from verification.figure import Figure, relative, rms, zero
-from verification.setup import Ask, G
-from verification.unweighted import OFF, switched_off
-from verification.weight import vertex_areas
+from verification.setup import Ask, G, forces, masses, vertex_areas, watch
+from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.step import narrow_phase
+
+wp.set_module_options({"enable_backward": False})
 
 EDGE, CELLS, DENSITY = 0.1, 4, 1000.0  # of the block that slides [m], [kg/m^3]
 YOUNG, POISSON, DAMPING = 1e5, 0.3, 2e-3  # [Pa], [-], [s]
@@ -31,12 +37,20 @@ SETTLE, SAMPLE = 0.8, 1.2  # [s]: the slow cell of ratio 4 lasts 1 s
 FPS = 60
 PENALTY = 500.0, 1.0  # [N/m], [N s/m]
 
+CLOSEST, EQUAL = "closest vertex", "plain mean"  # in place of the weights
+
+MEAN, HEIGHT = "mean normal force [N]", "ripple of the height [of an edge]"
+JUMP = "largest jump of the force at a vertex [of W]"  # of the base, in a frame
 NORMAL = 0.1, 0.02, 0.001  # rms of the force, of W
-ALONG = 0.05, 0.01, 0.001
-HEIGHT = 1e-3, 1e-4, 1e-5  # rms, of an edge
+LIMITS = {
+    "ripple of the normal force [of W]": NORMAL,
+    "its part at the frequency of the facets [of W]": NORMAL,
+    "rms of the force along [of W]": (0.05, 0.01, 0.001),
+    HEIGHT: (1e-3, 1e-4, 1e-5),  # rms, of an edge; on the fixed block
+}
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Both ratios on a fixed block; with and without weights on a deformable one, quick for one."""
     for ratio in RATIOS:
         yield from drag(ask, ratio, fixed=True)
@@ -61,80 +75,84 @@ def build(ratio: float, fixed: bool) -> wc.Scene:
     return scene
 
 
-@dataclass
-class Felt:
-    """What a slide over the facets showed.
-
-    Attributes:
-        weight: of the block [N]
-        mean: normal force [N]
-        normal: its ripple, of the weight
-        tone: the part of that at the frequency of the facets
-        along: force along, rms, of the weight
-        jump: largest change of the force at a vertex of the base in a frame, of the weight
-        height: ripple of the height, of an edge of the block
-    """
-
-    weight: float
-    mean: float
-    normal: float
-    tone: float
-    along: float
-    jump: float
-    height: float
-
-
-def slide(ask: Ask, ratio: float, fixed: bool) -> Felt:
-    """Let the block settle in motion, then watch it."""
+def slide(ask: Ask, ratio: float, fixed: bool) -> tuple[float, dict[str, float]]:
+    """Let the block settle in motion, then watch it: its weight [N], what was felt."""
     sim = wc.Simulation(build(ratio, fixed), ask.respond(*PENALTY), fps=FPS)
-    mass = sim.model.mass.numpy()[-len(sim.scene.bodies[1].x) :].astype(float)
-    weight = mass.sum() * G
-    for _ in sim.frames(round(SETTLE * FPS)):
-        pass
-    momentum = mass @ sim.velocities(1)[:, 0]
-    normal, along, height, below = [], [], [], []
-    for _ in sim.frames(round(SAMPLE * FPS)):
-        normal.append(sim.measure().forces.get(("base", "block"), 0.0))
-        before, momentum = momentum, mass @ sim.velocities(1)[:, 0]
-        along.append((momentum - before) * FPS)
-        height.append(mass @ sim.positions(1)[:, 2] / mass.sum())
-        below.append((sim.contact_fields()["pressure"] * vertex_areas(sim))[: -len(mass)])
-    mean = float(np.mean(normal))
+    mass = masses(sim, 1)
+
+    def look() -> tuple[float, ...]:
+        momentum = mass @ sim.velocities(1)[:, 0]
+        height = mass @ sim.positions(1)[:, 2] / mass.sum()
+        below = (sim.contact_fields()["pressure"] * vertex_areas(sim))[: -len(mass)]
+        return forces(sim, ("base", "block"))[0], momentum, height, *below
+
+    before = watch(sim, SETTLE, lambda: mass @ sim.velocities(1)[:, 0])[-1]
+    normal, momentum, height, *below = watch(sim, SAMPLE, look).T
+    weight, mean = mass.sum() * G, float(normal.mean())
     phase = 2j * np.pi * SPEED / (ratio * EDGE / CELLS) * np.arange(len(normal)) / FPS
-    tone = 2.0 * abs(np.mean((np.array(normal) - mean) * np.exp(-phase)))
-    jump = np.abs(np.diff(below, axis=0)).max()
-    forces = np.array([np.std(normal), tone, rms(along), jump]) / weight
-    return Felt(weight, mean, *map(float, forces), height=float(np.std(height)) / EDGE)
+    tone = 2.0 * abs(np.mean((normal - mean) * np.exp(-phase)))
+    along = np.diff(momentum, prepend=before) * FPS
+    jump = np.abs(np.diff(below, axis=1)).max()
+    felt = np.std(normal), tone, rms(along), weight * np.std(height) / EDGE, jump
+    return weight, {MEAN: mean} | dict(zip((*LIMITS, JUMP), np.array(felt) / weight, strict=True))
 
 
-def drag(ask: Ask, ratio: float, fixed: bool) -> Iterator[Figure]:
+def drag(ask: Ask, ratio: float, fixed: bool) -> Figures:
     """Ripples of both forces and of the height."""
-    yield from judged(slide(ask, ratio, fixed), ratio, fixed)
-
-
-def judged(felt: Felt, ratio: float, fixed: bool) -> Iterator[Figure]:
-    """A slide against its limits."""
     label = f"A9 facets 1:{ratio:g}, {'fixed' if fixed else 'deformable'} base"
-    yield relative(label, "mean normal force [N]", felt.mean, felt.weight, NORMAL)
-    yield zero(label, "ripple of the normal force [of W]", felt.normal, NORMAL)
-    yield zero(label, "its part at the frequency of the facets [of W]", felt.tone, NORMAL)
-    yield zero(label, "rms of the force along [of W]", felt.along, ALONG)
-    limits = HEIGHT if fixed else ()
-    yield zero(label, "ripple of the height [of an edge]", felt.height, limits)
-    yield Figure(label, "largest jump of the force at a vertex [of W]", felt.jump)
+    weight, felt = slide(ask, ratio, fixed)
+    yield relative(label, MEAN, felt[MEAN], weight, NORMAL)
+    for name, limits in LIMITS.items():
+        yield zero(label, name, felt[name], limits if fixed or name != HEIGHT else ())
+    yield Figure(label, JUMP, felt[JUMP])
 
 
-def compare(ask: Ask, ratio: float) -> Iterator[Figure]:
+def compare(ask: Ask, ratio: float) -> Figures:
     """On the deformable block with the weights, then without; the reference is with them."""
-    on = slide(ask, ratio, fixed=False)
-    yield from judged(on, ratio, fixed=False)
-    for how in OFF:
+    on = list(drag(ask, ratio, fixed=False))
+    yield from on
+    for how in (CLOSEST, EQUAL):
         with switched_off(how):
-            off = slide(ask, ratio, fixed=False)
-        label = f"A9 facets 1:{ratio:g}, {how}"
-        yield Figure(label, "mean normal force [N]", off.mean, on.mean)
-        yield Figure(label, "ripple of the normal force [of W]", off.normal, on.normal)
-        yield Figure(label, "its part at the frequency of the facets [of W]", off.tone, on.tone)
-        yield Figure(label, "rms of the force along [of W]", off.along, on.along)
-        yield Figure(label, "ripple of the height [of an edge]", off.height, on.height)
-        yield Figure(label, "largest jump of the force at a vertex [of W]", off.jump, on.jump)
+            _, off = slide(ask, ratio, fixed=False)
+        for f in on:
+            yield Figure(f"A9 facets 1:{ratio:g}, {how}", f.name, float(off[f.name]), f.value)
+
+
+@contextmanager
+def switched_off(how: str) -> Iterator[None]:
+    """Contacts of vertices without weights, in the block of a with statement."""
+    count = narrow_phase.count_contacts
+
+    def count_contacts(work, *others):
+        c, n_body = work.contacts, work.mesh.n_body
+        inputs = [how == CLOSEST, n_body, c.n_vertex]
+        wp.launch(level, work.capacity.contacts, inputs, outputs=[c.record])
+        count(work, *others)
+
+    with patch.object(narrow_phase, "count_contacts", count_contacts):
+        yield
+
+
+@wp.kernel
+def level(
+    # in
+    closest: bool,
+    n_body: int,
+    n_contact: wp.array[int],  # (1,)
+    # in, out
+    contact: wp.array[Contact],  # (capacity,)
+):
+    """One thread per contact: one corner of the triangle takes all of it, or each a third."""
+    c = wp.tid()
+    if c >= n_contact[0] or contact[c].pair[1] >= n_body or contact[c].coef[0] == 0.0:
+        return
+    coef = contact[c].coef  # of the triangle's corners from 2 on
+    most = int(2)
+    for k in range(3, 5):
+        if coef[k] < coef[most]:
+            most = k
+    for k in range(2, 5):
+        coef[k] = -1.0 / 3.0
+        if closest:
+            coef[k] = wp.where(k == most, -1.0, 0.0)
+    contact[c].coef = coef

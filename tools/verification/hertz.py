@@ -1,23 +1,27 @@
-"""A3: Hertz: a sphere pressed onto a rigid plane and onto another sphere.
+"""A3: Hertz: a sphere pressed onto a plane and onto another one, a long cylinder onto a plane.
 
     a = (3 F R / 4 E*)^(1/3),  d = a^2 / R,  p0 = 3 F / 2 pi a^2,  p = p0 sqrt(1 - r^2 / a^2)
-    1 / E* = sum (1 - nu^2) / E,  1 / R = sum 1 / R_i
+    b = sqrt(4 F' R / pi E*),  p0 = sqrt(F' E* / pi R),  p = p0 sqrt(1 - x^2 / b^2)
+    1 / E* = sum (1 - nu^2) / E,  1 / R = sum 1 / R_i,  F' the force per length of line
 
-(Hertz 1882; Johnson 1985, Contact Mechanics, ch. 4.) The body is the lower part of a ball of radius
-R, held at a plane above, with N elements across the radius of contact a. Pressures are compared at
+(Hertz 1882; Johnson 1985, Contact Mechanics, ch. 4.) The body is the lower part of a ball or of a
+slice of a cylinder, held at a plane above, with N elements across a or b. Pressures are compared at
 the force that is measured, so that the distance of the held plane, some 7 a, enters to the third
-order only. The second moment of p gives a^2 = 5 / 2 sum F_i r_i^2 / F.
+order only. The second moment of p gives a^2 = 5 / 2 sum F_i r_i^2 / F, b^2 = 4 sum F_i x_i^2 / F.
+
+The Poisson ratio of the slice is 0, so that plane strain needs no force on its ends and is exact
+with the ends free; its modulus is the E* of a ratio of 0.3, which is all that the pressures see.
+They are those of rows of vertices along the line: force over the width of a row.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import numpy as np
+from measure.figure import Figure, Figures, relative, zero
 
 import warp_contact as wc
-from verification.figure import Figure, relative, zero
-from verification.relax import relax, step_rate
-from verification.setup import Ask, Pose
-from verification.weight import vertex_areas
+from verification.relax import rest, step_rate
+from verification.setup import ALIGNED, Ask, Pose, vertex_areas
 from warp_contact.scene import shapes
 
 RADIUS, YOUNG, POISSON, DENSITY = 0.1, 1e6, 0.3, 1000.0  # [m], [Pa], [-], [kg/m^3]
@@ -26,10 +30,14 @@ LOADS = 5.0, 10.0, 20.0  # of the depths that are imposed [N]
 COUNTS = 1, 2, 4  # N
 RINGS = {1: 6, 2: 8, 4: 12}  # of the mesh, for each N; 3/4 as many layers
 SETTLE = 8.0  # 1 / (slowest frequency)
-SAMPLE = 0.2  # part of the frames at the end that is averaged
-PAIRS = {  # case: (radii [m], moduli [Pa], force [N])
-    "two equal spheres": ((0.1, 0.1), (1e6, 1e6), 5.0),
-    "soft on stiff sphere": ((0.1, 0.2), (1e6, 1e7), 5.0),
+LINE_LOAD = 100.0  # about F' [N/m]
+SLICE_WIDTH, SLICE_HEIGHT = 0.06, 0.08  # half the width and the height of the slice [m]
+ACROSS = 2  # cells along the line
+COLUMNS = {1: 8, 2: 10, 4: 14}  # from the middle to a side, for each N; as many layers
+FIT = 0.92  # of b: the N elements end there
+PAIRS = {  # case: (radii [m], the first RADIUS, moduli [Pa], force [N])
+    "two equal spheres": ((RADIUS, 0.1), (1e6, 1e6), 5.0),
+    "soft on stiff sphere": ((RADIUS, 0.2), (1e6, 1e7), 5.0),
 }
 
 # Errors of linear triangles with an exact active set, plane strain: good is twice that, best half.
@@ -38,11 +46,6 @@ PROFILE = {1: 0.223, 2: 0.112, 4: 0.089}
 RADIUS_LIMITS = 0.1, 0.03, 0.01
 SLOPE = 0.1, 0.05, 0.01
 OVERALL = "pressure, L2 error"  # name of the figure
-
-
-def around(base: float) -> tuple[float, float, float]:
-    """Limits about the error of the textbook method."""
-    return 2.0 * base, base, 0.5 * base
 
 
 def modulus(*youngs: float) -> float:
@@ -55,14 +58,41 @@ def contact_radius(force: float, radius: float, e_star: float) -> float:
     return float(np.cbrt(0.75 * force * radius / e_star))
 
 
-def run(ask: Ask) -> Iterator[Figure]:
-    """A plane with 1, 2, 4 elements, the exponent of F(d), then pairs; quick leaves 4 out."""
-    for n in COUNTS[: 2 if ask.quick else None]:
-        for turned in (False,) if ask.quick else (False, True):
-            yield from on_plane(ask, n, Pose(turned))
+def ball_contact(force: float, radius: float, e_star: float) -> tuple[float, float]:
+    """Exact a [m] and p0 [Pa]."""
+    a = contact_radius(force, radius, e_star)
+    return a, 1.5 * force / (np.pi * a**2)
+
+
+def line_contact(load: float, radius: float, e_star: float) -> tuple[float, float]:
+    """Exact b [m] and p0 [Pa] at the force per length ``load`` [N/m]."""
+    b = np.sqrt(4.0 * load * radius / (np.pi * e_star))
+    return float(b), float(np.sqrt(load * e_star / (np.pi * radius)))
+
+
+CONTACT = contact_radius(LOADS[1], RADIUS, modulus(YOUNG))  # a that the meshes are made for [m]
+Pressed = tuple[wc.Simulation, np.ndarray]  # at rest, mean pressures of the vertices [Pa]
+E_STAR, ORIGIN = modulus(YOUNG), (0.0, 0.0, 0.0)  # [Pa], [m]
+
+
+def run(ask: Ask) -> Figures:
+    """A sphere on a plane, the exponent of F(d), then pairs, quick one of them."""
+    yield from planes(ask, on_plane)
     yield from exponent(ask, 2)
     for name in list(PAIRS)[: 1 if ask.quick else None]:
         yield from on_sphere(ask, name, 2)
+
+
+def cylinder(ask: Ask) -> Figures:
+    """A cylinder on a plane."""
+    return planes(ask, line_on_plane)
+
+
+def planes(ask: Ask, on_plane: Callable) -> Figures:
+    """1, 2 and 4 elements across; quick leaves 4 and the turned ones out."""
+    for n in COUNTS[: 2 if ask.quick else None]:
+        for turned in (False,) if ask.quick else (False, True):
+            yield from on_plane(ask, n, Pose(turned))
 
 
 def cap(radius: float, size: float, rings: int) -> wc.TetMesh:
@@ -87,124 +117,145 @@ def graded(s: np.ndarray, slope: float) -> np.ndarray:
     return np.sinh(k * s) / np.sinh(k)
 
 
-def on_plane(ask: Ask, n: int, pose: Pose) -> Iterator[Figure]:
-    """Force, radius, peak and profile of the pressure."""
-    label = f"A3 sphere on plane, N = {n} {pose}"
-    a = contact_radius(LOADS[1], RADIUS, modulus(YOUNG))
-    sim, p = press(ask, n, a**2 / RADIUS, a, pose)
-    yield from profile(label, sim, p, RADIUS, modulus(YOUNG), n, pose)
-
-
-def press(
-    ask: Ask, n: float, depth: float, a: float, pose: Pose, rings: int | None = None
-) -> tuple[wc.Simulation, np.ndarray]:
-    """Press a sphere onto a plane by ``depth`` [m]; mean pressures of its vertices [Pa]."""
-    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
-    scene.add_plane(pose.out((0.0, 0.0, 1.0)), depth)
-    mesh = cap(RADIUS, a / n, rings or RINGS[n])
-    held = mesh.vertices[:, 2] > 0.999 * HEIGHT
-    scene.add_body(mesh, wc.Corotated(YOUNG, POISSON, DENSITY), rotation=pose.q, fixed=held)
-    respond = ask.respond(100.0 * YOUNG * a / n)
-    sim = wc.Simulation(scene, respond, fps=rate(a / n, YOUNG))
-    return sim, settle(sim, slowest(YOUNG))
-
-
-def rate(size: float, young: float) -> float:
-    """Frames per second for elements of ``size`` [m]."""
-    return step_rate(size, pressure_wave(young))
-
-
-def pressure_wave(young: float) -> float:
+def pressure_wave(young: float, poisson: float = POISSON) -> float:
     """Speed of pressure waves [m/s]."""
-    stiff = young * (1.0 - POISSON) / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
+    stiff = young * (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
     return float(np.sqrt(stiff / DENSITY))
 
 
-def slowest(young: float) -> float:
-    """Frequency of the slowest mode along the axis [1/s]."""
-    return 0.5 * np.pi * pressure_wave(young) / HEIGHT
+def squeeze(ask: Ask, bodies: list[tuple], size: float, depth=None, pose=ALIGNED) -> Pressed:
+    """Let bodies come to rest that are held at their planes above.
+
+    Each is a mesh with elements of ``size`` [m], a material, its place and rotation; with a depth
+    [m] there is a plane below.
+    """
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
+    if depth is not None:
+        scene.add_plane(pose.out((0.0, 0.0, 1.0)), depth)
+    for mesh, material, place, q in bodies:
+        z = mesh.vertices[:, 2]
+        scene.add_body(mesh, material, place, q, fixed=z > 0.999 * z.max())
+    young, poisson = bodies[0][1].youngs_modulus, bodies[0][1].poisson_ratio
+    speed = pressure_wave(young, poisson)
+    sim = wc.Simulation(scene, ask.respond(100.0 * young * size), fps=step_rate(size, speed))
+    omega = 0.5 * np.pi * speed / bodies[0][0].vertices[:, 2].max()
+    p = rest(sim, omega, SETTLE, lambda: sim.contact_fields()["pressure"].astype(float))
+    return sim, p.mean(axis=0)
 
 
-def settle(sim: wc.Simulation, omega: float) -> np.ndarray:
-    """Let it come to rest, slowest mode ``omega`` [1/s]; mean pressures of the last frames [Pa]."""
-    frames = int(np.ceil(SETTLE / omega * sim.fps))
-    first = int((1.0 - SAMPLE) * frames)
-    p = 0.0
-    for frame in relax(sim, omega, frames):
-        if frame > first:
-            p = p + sim.contact_fields()["pressure"].astype(float) / (frames - first)
-    return p
+def press(ask: Ask, n: float, depth: float, pose: Pose, rings: int | None = None) -> Pressed:
+    """Press a sphere onto a plane by ``depth`` [m]."""
+    ball = cap(RADIUS, CONTACT / n, rings or RINGS[n]), wc.Corotated(YOUNG, POISSON, DENSITY)
+    return squeeze(ask, [(*ball, ORIGIN, pose.q)], CONTACT / n, depth, pose)
 
 
-def profile(
-    label: str, sim: wc.Simulation, p: np.ndarray, radius: float, e_star: float, n: int, pose: Pose
-) -> Iterator[Figure]:
-    """The first body's pressures against those of Hertz at the same force."""
+def on_plane(ask: Ask, n: int, pose: Pose) -> Figures:
+    """Force, radius, peak and profile of the pressure."""
+    pressed = press(ask, n, CONTACT**2 / RADIUS, pose)
+    label = f"A3 sphere on plane, N = {n} {pose}"
+    yield from below(label, pressed, (ball_contact, RADIUS, E_STAR), n, pose)
+
+
+def below(label: str, pressed: Pressed, exact: tuple, n: int, pose: Pose) -> Figures:
+    """The pressures below the first sphere, at the vertices of its lower side."""
+    sim, p = pressed
     body = sim.scene.bodies[0]
-    count = len(body.x)
-    p, area = p[:count], vertex_areas(sim)[:count]
-    r = np.linalg.norm(pose.back(sim.positions(body))[:, :2], axis=1)
-    under = on_ball(body)
-    p, area, r = p[under], area[under], r[under]
+    under = np.flatnonzero(on_ball(body))
+    r = np.linalg.norm(pose.back(sim.positions(body)[under])[:, :2], axis=1)
+    found = r, p[under], vertex_areas(sim)[under]
+    yield from profile(label, ("force [N]", "radius"), found, exact, 2.5, n)
+
+
+def profile(label: str, names: tuple, found: tuple, exact: tuple, moment: float, n: int) -> Figures:
+    """Pressures against p0 sqrt(1 - r^2 / a^2) at the same force, with n elements across a.
+
+    ``names`` are those of the force and of a. What was found are places r [m], pressures there [Pa]
+    and how much of the surface each is for; exact is what gives a [m] and p0 [Pa] for a force, with
+    the radius [m] and E* [Pa] for it, and ``moment`` is a^2 over the second moment of p.
+    """
+    r, p, area = found
     force = float(p @ area)
-    if force <= 0.0:
-        yield zero(label, "force [N]", float("nan"), RADIUS_LIMITS)
+    pressed = force > 0.0
+    yield Figure(label, names[0], force, limits=() if pressed else RADIUS_LIMITS)
+    if not pressed:
         return
-    a = contact_radius(force, radius, e_star)
-    p0 = 1.5 * force / (np.pi * a**2)
-    exact = p0 * np.sqrt(np.maximum(1.0 - (r / a) ** 2, 0.0))
-    yield Figure(label, "force [N]", force)
-    found = float(np.sqrt(2.5 * (p * area) @ r**2 / force))
-    yield relative(label, "radius from the second moment [m]", found, a, RADIUS_LIMITS)
-    yield relative(label, "pressure at the middle [Pa]", p[r.argmin()], p0, around(PEAK[n]))
-    off = float(np.sqrt(area @ (p - exact) ** 2 / (area @ exact**2)))
+    a, p0 = exact[0](force, *exact[1:])
+    radius = np.sqrt(moment * (p * area) @ r**2 / force)
+    yield relative(label, f"{names[1]} from the second moment [m]", radius, a, RADIUS_LIMITS)
+    middle = p[np.abs(r).argmin()]
+    yield relative(label, "pressure at the middle [Pa]", middle, p0, around(PEAK[n]))
+    shape = p0 * np.sqrt(np.maximum(1.0 - (r / a) ** 2, 0.0))
+    off = np.sqrt(area @ (p - shape) ** 2 / (area @ shape**2))
     yield zero(label, OVERALL, off, around(PROFILE[n]))
 
 
+def around(base: float) -> tuple[float, float, float]:
+    """Limits about the error of the textbook method."""
+    return 2.0 * base, base, 0.5 * base
+
+
 def on_ball(body) -> np.ndarray:
-    """Mask of the vertices of the lower side of a cap."""
-    x = body.mesh.vertices
-    r = np.hypot(x[:, 0], x[:, 1])
-    height = x[:, 2] + np.sqrt(np.maximum(curvature(body) ** 2 - r**2, 0.0)) - curvature(body)
-    return np.abs(height) < 1e-9
+    """Mask of the vertices of the lower side of a cap of ``RADIUS``."""
+    x, y, z = body.mesh.vertices.T
+    return np.abs(z + np.sqrt(RADIUS**2 - x**2 - y**2) - RADIUS) < 1e-9
 
 
-def curvature(body) -> float:
-    """Radius of a cap from the height of its lower rim [m]."""
-    x = body.mesh.vertices
-    low = x[np.hypot(x[:, 0], x[:, 1]) > WIDTH - 1e-9, 2].min()
-    return 0.5 * (WIDTH**2 + low**2) / low
-
-
-def exponent(ask: Ask, n: int) -> Iterator[Figure]:
+def exponent(ask: Ask, n: int) -> Figures:
     """Slope of log F over log d; the held plane adds a part linear in F to d."""
-    e_star = modulus(YOUNG)
-    a = contact_radius(LOADS[1], RADIUS, e_star)
-    depths, forces = [], []
-    for load in LOADS:
-        depths.append(contact_radius(load, RADIUS, e_star) ** 2 / RADIUS)
-        sim, _ = press(ask, n, depths[-1], a, Pose())
-        forces.append(sum(sim.measure().forces.values()))
-    slope = float(np.polyfit(np.log(depths), np.log(forces), 1)[0])
+    depths = [contact_radius(f, RADIUS, modulus(YOUNG)) ** 2 / RADIUS for f in LOADS]
+    loads = [sum(press(ask, n, d, ALIGNED)[0].measure().forces.values()) for d in depths]
+    slope = float(np.polyfit(np.log(depths), np.log(loads), 1)[0])
     label = f"A3 sphere on plane, N = {n}"
     yield Figure(label, "exponent of F(d)", slope, 1.5, slope - 1.5, SLOPE)
 
 
-def on_sphere(ask: Ask, name: str, n: int) -> Iterator[Figure]:
+def on_sphere(ask: Ask, name: str, n: int) -> Figures:
     """Two caps, the upper one first, on meshes that do not match."""
     radii, youngs, load = PAIRS[name]
     e_star, radius = modulus(*youngs), 1.0 / sum(1.0 / r for r in radii)
     a = contact_radius(load, radius, e_star)
-    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
     half = np.radians(20.0) / 2.0  # the lower one upside down, turned by 20 degrees
-    for k, q in enumerate(((0.0, 0.0, 0.0, 1.0), (np.cos(half), np.sin(half), 0.0, 0.0))):
-        mesh = cap(radii[k], a / n, RINGS[n])
-        held = mesh.vertices[:, 2] > 0.999 * HEIGHT
+    turns = ALIGNED.q, (np.cos(half), np.sin(half), 0.0, 0.0)
+    bodies = []
+    for k, (own, young) in enumerate(zip(radii, youngs, strict=True)):
         # The stiffer one denser, for the same step.
-        material = wc.Corotated(youngs[k], POISSON, DENSITY * youngs[k] / YOUNG)
+        material = wc.Corotated(young, POISSON, DENSITY * young / YOUNG)
         place = (0.0, 0.0, k * a**2 / radius)
-        scene.add_body(mesh, material, place, q, fixed=held)
-    respond = ask.respond(100.0 * YOUNG * a / n)
-    sim = wc.Simulation(scene, respond, fps=rate(a / n, YOUNG))
-    p = settle(sim, slowest(YOUNG))
-    yield from profile(f"A3 {name}, N = {n}", sim, p, radius, e_star, n, Pose())
+        bodies.append((cap(own, a / n, RINGS[n]), material, place, turns[k]))
+    pressed = squeeze(ask, bodies, a / n)
+    yield from below(f"A3 {name}, N = {n}", pressed, (ball_contact, radius, e_star), n, ALIGNED)
+
+
+def slab(size: float, columns: int) -> wc.TetMesh:
+    """The slice about its lowest line, the y axis, with elements of ``size`` [m] there."""
+    box = wc.box((2.0, ACROSS * size, 1.0), (2 * columns, ACROSS, columns))
+    s, y, t = box.vertices.T
+    x = SLICE_WIDTH * np.sign(s) * graded(np.abs(s), size / SLICE_WIDTH * columns)
+    low = RADIUS - np.sqrt(RADIUS**2 - x**2)
+    z = low + (SLICE_HEIGHT - low) * graded(t + 0.5, size / SLICE_HEIGHT * columns)
+    return wc.TetMesh(np.stack([x, y, z], axis=1), box.tets)
+
+
+def line_on_plane(ask: Ask, n: int, pose: Pose) -> Figures:
+    """Force, half-width, peak and profile of the pressure."""
+    b, _ = line_contact(LINE_LOAD, RADIUS, E_STAR)
+    # About the force asked for (Johnson 1985, sec. 5.6, nu = 0).
+    depth = LINE_LOAD / (np.pi * E_STAR) * 2.0 * np.log(2.0 * SLICE_HEIGHT / b)
+    mesh, material = slab(FIT * b / n, COLUMNS[n]), wc.Corotated(E_STAR, 0.0, DENSITY)
+    sim, p = squeeze(ask, [(mesh, material, ORIGIN, pose.q)], FIT * b / n, depth, pose)
+    rows = by_row(mesh, p * vertex_areas(sim), pose.back(sim.positions())[:, 0])
+    label, names = f"A3 cylinder on plane, N = {n} {pose}", ("force [N/m]", "half-width")
+    yield from profile(label, names, rows, (line_contact, RADIUS, E_STAR), 4.0, n)
+
+
+def by_row(mesh: wc.TetMesh, force: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Places [m], pressures [Pa] and widths [m] of the rows of vertices along the line.
+
+    ``force`` [N] and ``at`` [m] are of each vertex: its force, its place across the line.
+    """
+    rest, row = np.unique(np.round(mesh.vertices[:, 0], 9), return_inverse=True)
+    per_row = np.bincount(row, force)
+    x = np.bincount(row, at * force, len(rest)) / np.maximum(per_row, 1e-30)
+    x = np.where(per_row > 0.0, x, rest)
+    width = np.gradient(x)
+    return x, per_row / np.ptp(mesh.vertices[:, 1]) / width, width

@@ -12,16 +12,15 @@ Those of Hertz are the orders of linear and quadratic elements against a curved 
 for the pressure.
 """
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
+from measure.figure import Figure, Figures
 
 import warp_contact as wc
-from verification import bars, cylinder, friction, hertz
-from verification.figure import Figure
+from verification import bars, friction, hertz
 from verification.relax import relax, step_rate
-from verification.setup import Ask, G, Pose
+from verification.setup import ALIGNED, Ask, G, masses, watch
 
 ELEMENTS = 10, 20, 40, 80  # along the bar
 # Of the sliding block and the resting bar. The first is about the stable step; finer ones differ
@@ -35,13 +34,14 @@ SMOOTH = 1.0, (0.1, 0.05, 0.01)
 PRESSURE = 1.0, (0.6, 0.2, 0.0)
 SHAPE = 2.0, (1.0, 0.2, 0.0)
 
-REST, LAYERS = bars.Bar(1.0, 1e5, 1000.0, 0.0), 10  # the bar that rests, its cells
-ON_PLANE = 5.0 * REST.young * REST.length / LAYERS  # of a penalty [N/m]
+LENGTH, YOUNG, DENSITY, LAYERS = 1.0, 1e5, 1000.0, 10  # of the bar that rests, and its cells
+WAVE = float(np.sqrt(YOUNG / DENSITY))  # speed in it [m/s]
+ON_PLANE = 5.0 * YOUNG * LENGTH / LAYERS  # of a penalty [N/m]
 DIP, WAIT = 0.3, 10  # start, of the weight; until [frames]: L / c, a quarter of a period
 RINGS = 4, 8, 16  # of nested meshes, 1, 2 and 4 elements across the contact
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Impact, sliding, resting, Hertz; the quick run leaves out what is finest."""
     last = -1 if ask.quick else None
     yield from impact(ask, ELEMENTS[:last])
@@ -61,7 +61,7 @@ def order(label: str, name: str, sizes, errors, target: tuple[float, tuple]) -> 
     return Figure(label, name, slope, ideal, missing, limits)
 
 
-def impact(ask: Ask, counts) -> Iterator[Figure]:
+def impact(ask: Ask, counts) -> Figures:
     """Restitution and energy of a bar on a wall; the step follows the elements."""
     found = [bars.record(bars.IMPACTS["on a wall"], ask, n) for n in counts]
     label = f"A8 bar on a wall, N = {', '.join(map(str, counts))}"
@@ -71,93 +71,81 @@ def impact(ask: Ask, counts) -> Iterator[Figure]:
     yield order(label, "order of the energy lost", sizes, lost, IMPACT)
 
 
-def sliding(ask: Ask) -> Iterator[Figure]:
-    """Place of a block on a slope; differences of successive steps, as it is not rigid.
+def in_steps(label: str, name: str, start: tuple, x: np.ndarray, seconds: float, of) -> Figure:
+    """Order of what ``of(sim)`` [m] is after some time, from differences of successive steps.
 
-    It is in motion from the start: letting go is not smooth.
+    ``start`` is a scene, a response and the frames per second, ``x`` the positions [m].
     """
-    scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
-    at_rest = friction.begin(ask, scene).positions()
-    places = []
+    found = []
     for n in SUBSTEPS:
-        sim = wc.Simulation(scene, ask.respond(*friction.PENALTY), FPS, substeps=n)
-        sim.state.x.assign(at_rest)
-        for _ in sim.frames(round(SLIDES * FPS)):
-            pass
-        places.append(friction.centre(sim)[0][0])
-    label = f"A8 sliding block, {', '.join(map(str, SUBSTEPS))} steps a frame"
-    sizes = 1.0 / np.array(SUBSTEPS[:-1])
-    yield order(label, "order of the place in dt", sizes, np.diff(places), SMOOTH)
+        sim = wc.Simulation(*start, substeps=n)
+        sim.state.x.assign(x)
+        watch(sim, seconds)
+        found.append(of(sim).astype(float))
+    errors = [np.linalg.norm(b - a) for a, b in pairwise(found)]
+    label = f"{label}, {', '.join(map(str, SUBSTEPS))} steps a frame"
+    return order(label, name, 1.0 / np.array(SUBSTEPS[:-1]), errors, SMOOTH)
 
 
-def pressure(ask: Ask, counts) -> Iterator[Figure]:
-    """L2 error of the pressure below a sphere and a cylinder."""
-    for body, case in (("sphere", hertz), ("cylinder", cylinder)):
-        errors = []
-        for n in counts:
-            found = case.on_plane(ask, n, Pose())
-            errors.append(next((f.value for f in found if f.name == hertz.OVERALL), np.nan))
-        label = f"A8 {body} on plane, N = {', '.join(map(str, counts))}"
-        yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)
+def sliding(ask: Ask) -> Figures:
+    """Place of a block on a slope, in motion from the start: letting go is not smooth."""
+    scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
+    x = friction.begin(ask, scene).positions()
+    start = scene, ask.respond(*friction.PENALTY), FPS
+    place = lambda sim: friction.centre(sim)[0, :1]  # noqa: E731
+    yield in_steps("A8 sliding block", "order of the place in dt", start, x, SLIDES, place)
 
 
-def resting(ask: Ask) -> Iterator[Figure]:
+def resting(ask: Ask) -> Figures:
     """State of a bar that trembles about its settlement on a plane and never leaves it.
 
     It starts at rest with a part of its weight; velocities count by length over wave speed.
     """
-    at_rest = settled(ask, DIP).positions()
-    rate = 10.0 * REST.c / REST.length
-    states = []
-    for n in SUBSTEPS:
-        sim = wc.Simulation(standing(1.0), ask.respond(ON_PLANE), rate, substeps=n)
-        sim.state.x.assign(at_rest)
-        for _ in sim.frames(WAIT):
-            pass
-        v = sim.velocities() * REST.length / REST.c
-        states.append(np.concatenate([sim.positions(), v]).astype(float))
-    errors = [np.linalg.norm(b - a) for a, b in pairwise(states)]
-    label = f"A8 resting bar, {', '.join(map(str, SUBSTEPS))} steps a frame"
-    sizes = 1.0 / np.array(SUBSTEPS[:-1])
-    yield order(label, "order of the state in dt", sizes, errors, SMOOTH)
+    fps = step_rate(LENGTH / LAYERS, WAVE)
+    at_rest = wc.Simulation(standing(DIP), ask.respond(ON_PLANE), fps)
+    omega = 0.5 * np.pi * WAVE / LENGTH
+    for _ in relax(at_rest, omega, round(14.0 / omega * fps)):
+        pass
+    rate = 10.0 * WAVE / LENGTH
+    start, x = (standing(1.0), ask.respond(ON_PLANE), rate), at_rest.positions()
+    state = lambda sim: np.append(sim.positions(), sim.velocities() * LENGTH / WAVE)  # noqa: E731
+    yield in_steps("A8 resting bar", "order of the state in dt", start, x, WAIT / rate, state)
 
 
 def standing(part: float) -> wc.Scene:
     """The bar on a plane under a part of gravity."""
     scene = wc.Scene(gravity=(0.0, 0.0, -part * G), friction=0.0)
     scene.add_plane((0.0, 0.0, 1.0), 0.0)
-    width = REST.length / LAYERS
-    mesh = wc.box((width, width, REST.length), (1, 1, LAYERS))
-    scene.add_body(mesh, wc.Corotated(REST.young, 0.0, REST.density), (0, 0, 0.5 * REST.length))
+    width = LENGTH / LAYERS
+    mesh = wc.box((width, width, LENGTH), (1, 1, LAYERS))
+    scene.add_body(mesh, wc.Corotated(YOUNG, 0.0, DENSITY), (0, 0, 0.5 * LENGTH))
     return scene
 
 
-def settled(ask: Ask, part: float) -> wc.Simulation:
-    """The bar at rest under a part of gravity."""
-    fps = step_rate(REST.length / LAYERS, REST.c)
-    sim = wc.Simulation(standing(part), ask.respond(ON_PLANE), fps)
-    omega = 0.5 * np.pi * REST.c / REST.length
-    for _ in relax(sim, omega, round(14.0 / omega * fps)):
-        pass
-    return sim
+def pressure(ask: Ask, counts) -> Figures:
+    """L2 error of the pressure below a sphere and a cylinder."""
+    for body, case in (("sphere", hertz.on_plane), ("cylinder", hertz.line_on_plane)):
+        errors = []
+        for n in counts:
+            found = case(ask, n, ALIGNED)
+            errors.append(next((f.value for f in found if f.name == hertz.OVERALL), np.nan))
+        label = f"A8 {body} on plane, N = {', '.join(map(str, counts))}"
+        yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)
 
 
-def shape(ask: Ask, across: float) -> Iterator[Figure]:
+def shape(ask: Ask, across: float) -> Figures:
     """L2 norm of the displacement below a sphere; differences of successive, nested meshes.
 
     ``across`` elements are in the contact of the first.
     """
-    a = hertz.contact_radius(hertz.LOADS[1], hertz.RADIUS, hertz.modulus(hertz.YOUNG))
-    found = []
+    depth, found = hertz.CONTACT**2 / hertz.RADIUS, []
     for rings in RINGS:
-        n = across * rings / RINGS[0]
-        sim, _ = hertz.press(ask, n, a**2 / hertz.RADIUS, a, Pose(), rings)
-        rest = sim.scene.bodies[0].x
+        sim, _ = hertz.press(ask, across * rings / RINGS[0], depth, ALIGNED, rings)
+        start = sim.scene.bodies[0].x
         if not found:
-            first, weight = rest, sim.model.mass.numpy().astype(float)
-        apart = np.linalg.norm(first[:, None] - rest, axis=2)
-        at = apart.argmin(axis=1)
-        found.append((sim.positions().astype(float) - rest)[at])
+            first, weight = start, masses(sim)
+        at = np.linalg.norm(first[:, None] - start, axis=2).argmin(axis=1)
+        found.append((sim.positions().astype(float) - start)[at])
     errors = [np.sqrt(weight @ ((v - u) ** 2).sum(axis=1)) for u, v in pairwise(found)]
     label = f"A8 sphere on plane, {', '.join(map(str, RINGS))} rings"
     yield order(label, "order of the displacement, L2", 1.0 / np.array(RINGS[:-1]), errors, SHAPE)

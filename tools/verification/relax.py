@@ -7,6 +7,8 @@ Euler lag by h/2, so what is scaled is v + h/2 f/m; scaling v itself would feed 
 of more steps would see modes of a whole number of half periods always at rest and never damp them.
 """
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import warp as wp
 
@@ -17,16 +19,27 @@ ZETA = 0.7  # of the slowest mode: the fastest decay without a long tail
 
 
 def step_rate(edge: float, speed: float) -> float:
-    """Frames per second [1/s] of about one stable step.
+    """Frames per second [1/s] of about one stable step, for the shortest edge of a cell [m].
 
-    Args:
-        edge: shortest edge of a cell [m]
-        speed: of the waves [m/s]; the tets of a cell have modes of some 3.5 speed / edge
+    The tets of a cell have modes of some 3.5 speed / edge, with the speed of the waves [m/s].
     """
     return 3.0 * speed / edge
 
 
-def relax(sim: wc.Simulation, omega: float, frames: int):
+def rest(
+    sim: wc.Simulation, omega: float, lasts: float, of: Callable, part=0.2, least=0, calmed=True
+) -> np.ndarray:
+    """Let a scene come to rest; what ``of()`` is after each of the last frames, shape (n, ...).
+
+    It ``lasts`` for so many 1 / ``omega`` [1/s], that of the slowest mode, ``least`` frames at
+    least, of which a ``part`` are the last; ``calmed`` unless the material damps enough.
+    """
+    frames = max(least, int(np.ceil(lasts / omega * sim.fps)))
+    run = relax(sim, omega, frames) if calmed else sim.frames(frames)
+    return np.array([of() for frame in run if frame > (1.0 - part) * frames])
+
+
+def relax(sim: wc.Simulation, omega: float, frames: int) -> Iterator[int]:
     """Step ``frames`` frames, calm each, and yield its number; ``omega`` [1/s], slowest mode."""
     factor = float(np.exp(-2.0 * ZETA * omega / sim.fps))
     for frame in sim.frames(frames):

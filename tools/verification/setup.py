@@ -1,13 +1,13 @@
-"""What the cases share: what is asked of them, meshes, orientations, responses.
+"""What the cases share: what is asked of them, meshes, orientations, responses, samples of a run.
 
 A method that is right only for one mesh, or only along the axes, is not right: cases run on meshes
 that are structured, mirrored and jittered, and along the axes and turned.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from checks.collision import ANGLES, quaternion
 
 import warp_contact as wc
 from warp_contact.scene.scene import rotation_matrix
@@ -15,18 +15,13 @@ from warp_contact.scene.scene import rotation_matrix
 G = 9.81  # [m/s^2]
 MESHES = "structured", "mirrored", "jittered"
 JITTER = 0.15  # of a cell: largest shift of a vertex; no tet comes near to inverting
+ANGLES = 17.0, 31.0, 53.0  # of what is turned, about x, then y, then z [degrees]
 RESPONSES = "default", "literal", "penalty", "predicted"
 
 
 @dataclass(frozen=True)
 class Ask:
-    """What is asked of a case.
-
-    Attributes:
-        quick: fewer variants, coarser meshes
-        response: one of ``RESPONSES``
-        seed: of the jittered meshes
-    """
+    """What is asked of a case: fewer variants, one of ``RESPONSES``, a seed of jittered meshes."""
 
     quick: bool = True
     response: str = "default"
@@ -63,6 +58,16 @@ class Pose:
         return np.asarray(world, dtype=float) @ self._r
 
 
+def quaternion(angles) -> np.ndarray:
+    """Rotations about x, then y, then z [degrees] as a quaternion (x, y, z, w)."""
+    (a, b, c), (d, e, f) = (g(np.radians(angles) / 2.0) for g in (np.cos, np.sin))
+    x, y = d * b * c - a * e * f, a * e * c + d * b * f
+    return np.array([x, y, a * b * f - d * e * c, a * b * c + d * e * f])
+
+
+ALIGNED = Pose()
+
+
 def block(size, cells, mesh: str = "structured", seed: int = 0) -> wc.TetMesh:
     """A block about the origin; its faces stay plane when its vertices are jittered."""
     regular = wc.box(size, cells, mirrored=mesh == "mirrored")
@@ -80,3 +85,58 @@ def on_face(mesh: wc.TetMesh, axis: int, side: int) -> np.ndarray:
     """Mask of the vertices on the face of a block at its lower (-1) or upper (1) end."""
     x = side * mesh.vertices[:, axis]
     return x > x.max() - 1e-6 * np.ptp(x)
+
+
+def gradients(x: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Of the linear shape functions of the corners of each tet [1/m], shape (n_tet, 4, 3)."""
+    g = np.linalg.inv(x[tets[:, 1:]] - x[tets[:, :1]]).swapaxes(1, 2)
+    return np.concatenate([-g.sum(axis=1, keepdims=True), g], axis=1)
+
+
+def watch(sim: wc.Simulation, seconds: float, of: Callable = lambda: None) -> np.ndarray:
+    """Step for some time [s]; what ``of()`` is after each frame, shape (frames, ...)."""
+    return np.array([of() for _ in sim.frames(round(seconds * sim.fps))])
+
+
+def forces(sim: wc.Simulation, *pairs: tuple[str, str]) -> np.ndarray:
+    """Contact forces [N] between pairs of labels, shape (pairs,)."""
+    found = sim.measure().forces
+    return np.array([found.get(pair, 0.0) for pair in pairs])
+
+
+def masses(sim: wc.Simulation, body: int | None = None) -> np.ndarray:
+    """Of the vertices of one body or of all [kg], in double precision."""
+    ends = sim.model.body_vert.numpy()
+    part = slice(None) if body is None else slice(*ends[body : body + 2])
+    return sim.model.mass.numpy()[part].astype(float)
+
+
+def vertex_areas(sim: wc.Simulation) -> np.ndarray:
+    """A third of the surface around each vertex [m^2], shape (n_vert,)."""
+    tris, x = sim.model.tris.numpy(), sim.positions().astype(float)
+    a, b, c = np.moveaxis(x[tris], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+    return np.bincount(tris.ravel(), np.repeat(area, 3), minlength=len(x))
+
+
+def facing(x: np.ndarray, tris: np.ndarray, up: float, least: float = 0.9) -> np.ndarray:
+    """The triangles whose normals are along z, up (1) or down (-1), shape (k, 3)."""
+    a, b, c = np.moveaxis(x[tris], 1, 0)
+    n = np.cross(b - a, c - a)
+    return tris[up * n[:, 2] > least * np.linalg.norm(n, axis=1)]
+
+
+def height(points: np.ndarray, x: np.ndarray, tris: np.ndarray, slack=1e-3) -> np.ndarray:
+    """Height [m] of a surface at the (x, y) of each point; nan beside it. Shape (n,)."""
+    a, b, c = (x[tris[:, k]].astype(float) for k in range(3))
+    u, v = (b - a)[:, :2], (c - a)[:, :2]
+    d = points[:, None, :2].astype(float) - a[:, :2]  # (n, k, 2)
+    whole = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    s = (d[..., 0] * v[:, 1] - d[..., 1] * v[:, 0]) / whole
+    t = (u[:, 0] * d[..., 1] - u[:, 1] * d[..., 0]) / whole
+    least = np.minimum(np.minimum(s, t), 1.0 - s - t)
+    best = least.argmax(axis=1)
+    row = np.arange(len(points))
+    s, t = s[row, best], t[row, best]
+    z = a[best, 2] + s * (b - a)[best, 2] + t * (c - a)[best, 2]
+    return np.where(least[row, best] >= -slack, z, np.nan)

@@ -1,32 +1,42 @@
-"""A1: two overlapping columns are two springs in series.
+"""A1: overlapping columns are springs in series, and a stack of cubes is one column.
 
     p = (g - s) / (L1/E1 + L2/E2),  s = rho1 G L1^2 / 2 E1 - rho2 G L2^2 / 2 E2
     interface at L1 - p L1/E1 - rho1 G L1^2 / 2 E1
 
-for an overlap g of the rest shapes, Poisson ratio 0, outer ends held; s is what gravity adds to
+for an overlap g of two rest shapes, Poisson ratio 0, outer ends held; s is what gravity adds to
 the gap (Spillmann and Teschner 2005, Fig. 6, put into numbers with the strength of materials).
 The densities of the weightless cases go with the moduli, so that both columns have the same
 wave speed; the equilibrium does not know them.
+
+    pressure above cube k = rho G (5 - k) L,  settlement of the top = rho G (5 L)^2 / 2 E
+
+for five cubes of length L under their own weight, base held. They start in this state, with a
+resting gap between them.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from measure.figure import Figure, Figures, relative, zero
 
 import warp_contact as wc
-from verification import columns
-from verification.columns import Column
-from verification.figure import Figure, relative, zero
-from verification.relax import ZETA, relax, step_rate
-from verification.setup import MESHES, Ask, G, Pose
+from verification.columns import Column, Pile, between
+from verification.relax import ZETA, rest
+from verification.setup import ALIGNED, MESHES, Ask, G, Pose
 
 # Good: the quantum of the paper's search, 2^-5 of the overlap. Excellent: half of what penalty
 # forces of 100 E / L leave. Best: float32.
 LIMITS = 0.031, 0.005, 1e-5
 SETTLE = 14.0  # 1 / (slowest frequency): exp(-0.7 * 14) = 6e-5 of the overlap remain
-SAMPLE = 0.2  # part of the frames at the end over which forces are averaged
 DAMPED = 0.35  # ratio of the slowest mode in the run with a damped material
+LAYERS = 8  # of cells along a column
+ACROSS = 4, 6  # cells across the upper column; the lower one has 4
+
+COUNT, YOUNG, DENSITY = 5, 1e6, 1000.0  # of cubes of 1 m [Pa], [kg/m^3]: 4.9 % strain at the base
+CELLS = (4, 4), (4, 3)  # of the cubes, in turn
+GAP = 2.5e-4  # between the cubes at the start [m]: a thousandth of an edge of a cell
+FRICTION = 0.3
+STACK_SETTLE = 10.0  # the start is near the end
 
 
 @dataclass(frozen=True)
@@ -41,26 +51,12 @@ class Case:
     density: float | None = None
 
     @property
-    def gravity(self) -> float:
-        """Downwards [m/s^2]."""
-        return G if self.density else 0.0
-
-    @property
-    def sinks(self) -> tuple[float, float]:
-        """By its own weight: the top of column 1, and the foot of the hanging column 2 [m]."""
-        weight = (self.density or 0.0) * self.gravity
-        return 0.5 * weight * self.l1**2 / self.e1, 0.5 * weight * self.l2**2 / self.e2
-
-    @property
-    def pressure(self) -> float:
-        """Exact [Pa]."""
-        first, second = self.sinks
-        return (self.overlap - first + second) / (self.l1 / self.e1 + self.l2 / self.e2)
-
-    @property
-    def interface(self) -> float:
-        """Exact height [m]."""
-        return self.l1 - self.pressure * self.l1 / self.e1 - self.sinks[0]
+    def exact(self) -> tuple[float, float]:
+        """Pressure [Pa] and height of the interface [m]."""
+        weight = (self.density or 0.0) * G
+        first, second = 0.5 * weight * self.l1**2 / self.e1, 0.5 * weight * self.l2**2 / self.e2
+        pressure = (self.overlap - first + second) / (self.l1 / self.e1 + self.l2 / self.e2)
+        return pressure, self.l1 - pressure * self.l1 / self.e1 - first
 
 
 CASES = {
@@ -72,88 +68,79 @@ CASES = {
     "unequal lengths": Case(2e5, 0.5, 1e5, 2.0, 0.05),
     "gravity": Case(1e6, 1.0, 3e6, 1.0, 0.02, 1000.0),
 }
-CELLS = 4, 6  # across the upper column; the lower one has 4
 
 
-def run(ask: Ask) -> Iterator[Figure]:
+def run(ask: Ask) -> Figures:
     """Every case; the quick run takes each on matching and on other, turned and jittered cells."""
     quick = ((4, "structured", False), (6, "jittered", True))
-    full = [(n, mesh, turned) for n in CELLS for mesh in MESHES for turned in (False, True)]
-    for name, case in CASES.items():
+    full = [(n, mesh, turned) for n in ACROSS for mesh in MESHES for turned in (False, True)]
+    for name in CASES:
         for across, mesh, turned in quick if ask.quick else full:
-            yield from press(name, case, ask, across, mesh, Pose(turned))
-    yield from press("equal", CASES["equal"], ask, 6, "structured", Pose(), DAMPED)
+            yield from press(name, ask, across, mesh, Pose(turned))
+    yield from press("equal", ask, 6, "structured", ALIGNED, DAMPED)
 
 
-def pair(case: Case, across: int, mesh: str, seed: int) -> tuple[Column, Column]:
-    """Both columns."""
-    rho = case.density
-    lower = Column(
-        case.e1, case.l1, (1.0, 1.0), (4, 4, 8), rho or 1e-2 * case.e1, mesh=mesh, seed=seed
-    )
-    upper = Column(
-        case.e2,
-        case.l2,
-        (1.0, 1.0),
-        (across, across, 8),
-        rho or 1e-2 * case.e2,
-        0.0,
-        mesh,
-        seed + 1,
-    )
-    return lower, upper
-
-
-def press(
-    name: str, case: Case, ask: Ask, across: int, mesh: str, pose: Pose, damped: float = 0.0
-) -> Iterator[Figure]:
+def press(name: str, ask: Ask, across: int, mesh: str, pose: Pose, damped=0.0) -> Figures:
     """Let the columns push each other apart, to rest.
 
     ``damped``: of the slowest mode, by the material instead of by relaxation.
     """
+    case = CASES[name]
     label = f"A1 {name} 4:{across} {mesh} {pose}{' damped' if damped else ''}"
-    lower, upper = pair(case, across, mesh, ask.seed)
-    speed = max(lower.wave_speed, upper.wave_speed)
-    omega = 0.5 * np.pi * min(lower.wave_speed / case.l1, upper.wave_speed / case.l2)
-    if damped:
-        beta = 2.0 * damped / omega
-        lower, upper = replace(lower, damping=beta), replace(upper, damping=beta)
-    scene = columns.build(lower, upper, case.overlap, pose, case.gravity)
-    # 100 E / L in all, split among the vertices of both faces.
-    stiffness = 100.0 * case.e1 / (case.l1 + case.l2) / (25 + (across + 1) ** 2)
-    cell = min(1.0 / across, case.l1 / 8, case.l2 / 8)
-    sim = wc.Simulation(scene, ask.respond(stiffness), fps=step_rate(cell, speed))
-    settle = SETTLE * (ZETA / damped if damped else 1.0) / omega
-    frames = int(np.ceil(settle * sim.fps))
-    forces = []
-    for frame in sim.frames(frames) if damped else relax(sim, omega, frames):
-        if frame > (1.0 - SAMPLE) * frames:
-            forces.append(sim.measure().forces.get(("lower", "upper"), 0.0))
-    yield from report(label, case, sim, pose, float(np.mean(forces)))
-
-
-def report(
-    label: str, case: Case, sim: wc.Simulation, pose: Pose, force: float
-) -> Iterator[Figure]:
-    """Pressure, both sides of the interface, what is left of the overlap, the stress."""
-    g = case.overlap
-    yield relative(label, "contact force / section [Pa]", force, case.pressure, LIMITS)
-    for side, z in zip(("lower", "upper"), columns.faces(sim, pose), strict=True):
-        off = (z.mean() - case.interface) / g
-        name = f"mean height of the {side} face [m]"
-        yield Figure(label, name, z.mean(), case.interface, off, LIMITS)
-    yield zero(label, "deepest overlap [of that at the start]", sim.measure().overlap / g, LIMITS)
+    columns = []
+    for k, (e, length, n) in enumerate(((case.e1, case.l1, 4), (case.e2, case.l2, across))):
+        density = case.density or 1e-2 * e
+        columns.append(Column(e, length, density, (n, n, LAYERS), mesh=mesh, seed=ask.seed + k))
+    omega = min(c.slowest for c in columns)
+    columns = [replace(c, damping=2.0 * damped / omega) for c in columns]
+    gravity = G if case.density else 0.0
+    pile = Pile(columns, -case.overlap, clamped=True, pose=pose, gravity=gravity)
+    sim = pile.simulate(ask)
+    lasts = SETTLE * (ZETA / damped if damped else 1.0)
+    force = rest(sim, omega, lasts, lambda: between(sim), calmed=not damped).mean()
+    exact, interface = case.exact
+    yield relative(label, "contact force / section [Pa]", force, exact, LIMITS)
+    for k, side in enumerate(("lower", "upper")):
+        z = float(pile.face(sim, k, 1 - 2 * k).mean())
+        name, off = f"mean height of the {side} face [m]", (z - interface) / case.overlap
+        yield Figure(label, name, z, interface, off, LIMITS)
+    left = sim.measure().overlap / case.overlap
+    yield zero(label, "deepest overlap [of that at the start]", left, LIMITS)
     if case.density is None:
-        body = sim.scene.bodies[0]
-        p = layer_means(body, columns.axial(sim, body, pose))
-        worst = p[np.abs(p - case.pressure).argmax()]
-        yield relative(label, "stress of the worst layer [Pa]", worst, case.pressure, LIMITS)
+        p = layer_means(sim.scene.bodies[0].mesh, pile.pressures(sim, sim.scene.bodies[0]))
+        worst = p[np.abs(p - exact).argmax()]
+        yield relative(label, "stress of the worst layer [Pa]", worst, exact, LIMITS)
 
 
-def layer_means(body, values: np.ndarray) -> np.ndarray:
-    """Means over the eight layers of tets of a column, weighted by volume."""
-    z = body.mesh.vertices[body.mesh.tets].mean(axis=1)[:, 2]
-    low, high = body.mesh.vertices[:, 2].min(), body.mesh.vertices[:, 2].max()
-    layer = np.clip(((z - low) / (high - low) * 8).astype(int), 0, 7)
-    w = body.mesh.volumes
-    return np.bincount(layer, w * values) / np.bincount(layer, w)
+def layer_means(mesh: wc.TetMesh, values: np.ndarray) -> np.ndarray:
+    """Means over the layers of tets of a column, weighted by volume."""
+    z = mesh.vertices[mesh.tets].mean(axis=1)[:, 2]
+    low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
+    layer = np.clip(((z - low) / (high - low) * LAYERS).astype(int), 0, LAYERS - 1)
+    return np.bincount(layer, mesh.volumes * values) / np.bincount(layer, mesh.volumes)
+
+
+def stack(ask: Ask) -> Figures:
+    """Equal and other cells; the full run turns them, mirrors and jitters the meshes too."""
+    plain = [(cells, "structured", False) for cells in CELLS]
+    more = [(cells, mesh, True) for cells in CELLS for mesh in ("mirrored", "jittered")]
+    for cells, mesh, turned in plain if ask.quick else plain + more:
+        yield from stand(ask, cells, mesh, Pose(turned))
+
+
+def stand(ask: Ask, cells: tuple[int, int], mesh: str, pose: Pose) -> Figures:
+    """Forces between the cubes and the height of the top."""
+    label = f"A1 stack of five {cells[0]}:{cells[1]} {mesh} {pose}"
+    counts = [(cells[k % 2],) * 3 for k in range(COUNT)]
+    cubes = [
+        Column(YOUNG, 1.0, DENSITY, count, mesh=mesh, seed=ask.seed + k)
+        for k, count in enumerate(counts)
+    ]
+    pile = Pile(cubes, GAP, pose=pose, gravity=G, friction=FRICTION)
+    sim = pile.simulate(ask, 0.0)
+    found = rest(sim, cubes[0].slowest / COUNT, STACK_SETTLE, lambda: between(sim))
+    for k, pressure in enumerate(found.mean(axis=0)):
+        exact = DENSITY * G * (COUNT - 1 - k)
+        yield relative(label, f"pressure above cube {k} [Pa]", pressure, exact, LIMITS)
+    settled, exact = COUNT - pile.face(sim, -1, 1).mean(), DENSITY * G * COUNT**2 / (2.0 * YOUNG)
+    yield relative(label, "settlement of the top [m]", settled, exact, LIMITS)

@@ -3,128 +3,182 @@
     sum F_n = rho L^3 G,  the centre of pressure is below the centre of mass,
     and on three points each carries the barycentric part of the centre of mass among them.
 
-On a plane and on another block as in ``tools/check.py``; then on a membrane held at its rim and on
-the tips of three fixed tets.
+On a plane and on another block, whose cells, direction and stiffness are its own; then on a
+membrane held at its rim and on the tips of three fixed tets. Last, a light cube carries an equal
+one R times as dense, R from 1 to 10000: E = 20 R rho G L, 5 % of strain in it, Poisson ratio 0. It
+starts in the static state of a column, the wave speeds differ by sqrt(R).
 """
 
-from collections.abc import Iterator
-
 import numpy as np
-from checks import weight as check
+from measure.figure import Figure, Figures, relative, zero
 
 import warp_contact as wc
-from verification.figure import Figure, relative, zero
-from verification.setup import Ask, G
+from verification.columns import Column, Pile, between
+from verification.relax import rest
+from verification.setup import Ask, G, forces, masses, vertex_areas, watch
 
-FORCE = 0.02, 0.001, 1e-5
-RIPPLE = 0.05, 0.005, 1e-5
-CENTRE = 0.02, 0.001, 1e-5  # of an edge of the block: the moment balance, as sharp as the force
+EDGE = 0.1  # of a block [m]
+YOUNG, POISSON, DENSITY, DAMPING = 5e4, 0.3, 1000.0, 2e-3  # [Pa], [-], [kg/m^3], [s]
+WEIGHT = DENSITY * EDGE**3 * G  # [N]
+GAP = 0.005  # stacked blocks fall by this [m]
+SETTLE, SAMPLE = 2.0, 0.5  # [s]
+STACK_SAMPLE = 1.0  # [s]
+FPS = 60
+TURN = (0.0, 0.0, np.sin(np.radians(10.0)), np.cos(np.radians(10.0)))  # 20 degrees about z
+STACKS = {  # case: (cells of the lower block, of the upper, ratio of stiffness, rotation)
+    "on a plane": (3, None, 1.0, None),
+    "on a block 3:4": (3, 4, 1.0, None),
+    "on a block 4:3": (4, 3, 1.0, None),
+    "on a block 3:4, turned by 20 degrees": (3, 4, 1.0, TURN),
+    "on a block 3:4, lower one 10 times stiffer": (3, 4, 0.1, None),
+    "on a block 3:4, upper one 10 times stiffer": (3, 4, 10.0, None),
+}
 SHEET, SHEET_CELLS = (0.3, 0.3, 0.02), (12, 12, 1)  # [m]
 TIPS = np.array([[-0.03, -0.025], [0.035, -0.02], [0.005, 0.04]])  # (x, y) [m]
 SPIKE = 0.02  # height of a supporting tet [m]
 STIFF = 20.0  # times the modulus of the block on the tips: it tilts by its dents, 1e-3
 GRIP = 0.02  # friction on the tips: holds against that tilt, adds 2e-4 to the size of a force
-SETTLE, SAMPLE = 2.0, 0.5  # [s]
-STIFFNESS, DAMPING = 500.0, 1.0  # of a penalty [N/m], [N s/m]: sinks by 1 % of an edge of a cell
-ON_TIP = 1e4  # the same for the single contact of a tip [N/m]
+PENALTY = 500.0, 1.0  # [N/m], [N s/m]: sinks by 1 % of an edge of a cell
+ON_TIP = 1e4, 1.0  # the same for the single contact of a tip
+MASSES = 1.0, 10.0, 100.0, 1e3, 1e4  # R
+CUBES, APART = (2, 3), 3e-5  # cells of the light and the heavy cube, gap at the start [m]
+REST, LEAST = 10.0, 200  # 1 / (slowest frequency), frames
+BLOCK = 10  # frames in a force of the ripple: one alone is a step or two
+
+FORCE = 0.02, 0.001, 1e-5
+RIPPLE = 0.05, 0.005, 1e-5
+CENTRE = 0.02, 0.001, 1e-5  # of an edge of the block: the moment balance, as sharp as the force
 
 
-def run(ask: Ask) -> Iterator[Figure]:
-    """What carries the block, one after the other."""
-    for case, stack in list(check.STACKS.items())[: 2 if ask.quick else None]:
-        yield from checked(f"A7 {case}", stack, ask)
+def run(ask: Ask) -> Figures:
+    """What carries the block, one after the other; the quick run takes the first two stacks."""
+    for case, stack in list(STACKS.items())[: 2 if ask.quick else None]:
+        yield from stacked(f"A7 {case}", stack, ask)
     yield from centre("A7 on a plane, centre of pressure", ask)
     yield from on_sheet("A7 on a membrane", ask)
     yield from on_points("A7 on three points", ask)
 
 
-def checked(label: str, stack: tuple, ask: Ask) -> Iterator[Figure]:
-    """The rows of ``tools/check.py`` as figures."""
-    for row in check.settle(label, *stack, ask.respond(STIFFNESS, DAMPING)):
-        if "[%" in row.figure and "overlap" not in row.figure:
-            limits = FORCE if row.figure.startswith("mean force") else RIPPLE
-            name = row.figure[: row.figure.index(" [%")] + " [of the mean]"
-            yield zero(label, name, row.value / 100.0, limits)
+def rubber(stiff: float = 1.0) -> wc.NeoHookean:
+    """The material of a block."""
+    return wc.NeoHookean(stiff * YOUNG, POISSON, DENSITY, DAMPING)
 
 
-def cube(scene: wc.Scene, height: float, cells: int = 3, stiff: float = 1.0) -> wc.Scene:
-    """Add the block of ``tools/check.py``, its foot at ``height`` [m]."""
-    material = wc.NeoHookean(stiff * check.YOUNG, check.POISSON, check.DENSITY, check.DAMPING)
-    place = (0.0, 0.0, height + 0.5 * check.EDGE)
-    scene.add_body(wc.box(check.EDGE, cells), material, place, label="block")
-    return scene
+def settled(ask: Ask, scene: wc.Scene, penalty: tuple[float, float] = PENALTY) -> wc.Simulation:
+    """A scene after it came to rest."""
+    sim = wc.Simulation(scene, ask.respond(*penalty), fps=FPS)
+    watch(sim, SETTLE)
+    return sim
 
 
-def settled(
-    scene: wc.Scene, ask: Ask, stiffness: float = STIFFNESS
-) -> tuple[wc.Simulation, Iterator[int]]:
-    """A scene after it came to rest, and the frames to sample."""
-    sim = wc.Simulation(scene, ask.respond(stiffness, DAMPING), fps=check.FPS)
-    for _ in sim.frames(round(SETTLE * check.FPS)):
-        pass
-    return sim, sim.frames(round(SAMPLE * check.FPS))
+def steady(label: str, name: str, mean: float, force: np.ndarray, weight: float) -> Figures:
+    """Mean and ripple of a force [N] that ought to be a weight."""
+    yield relative(label, f"mean force{name} [N]", mean, weight, FORCE)
+    ripple = np.std(force) / max(mean, 1e-9)
+    yield zero(label, f"ripple of the force{name} [of the mean]", ripple, RIPPLE)
 
 
-WEIGHT = check.DENSITY * check.EDGE**3 * G  # [N]
+def stacked(label: str, stack: tuple, ask: Ask) -> Figures:
+    """Let a stack come to rest, then watch the forces between all that touches."""
+    lower, upper, ratio, rotation = stack
+    scene = wc.Scene(gravity=(0.0, 0.0, -G))
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    soft = max(1.0, 1.0 / ratio)
+    scene.add_body(wc.box(EDGE, lower), rubber(soft), (0, 0, 0.5 * EDGE + GAP), label="lower")
+    if upper:
+        turn = rotation or (0.0, 0.0, 0.0, 1.0)
+        place = (0.0, 0.0, 1.5 * EDGE + 2.0 * GAP)
+        scene.add_body(wc.box(EDGE, upper), rubber(ratio * soft), place, turn, label="upper")
+    carried = {("lower", "plane0"): len(scene.bodies) * WEIGHT}
+    carried |= {("lower", "upper"): WEIGHT} if upper else {}
+    sim = settled(ask, scene)
+
+    def look() -> tuple[float, ...]:
+        return *forces(sim, *carried), sim.measure().overlap
+
+    *found, overlap = watch(sim, STACK_SAMPLE, look).T
+    for (first, second), weight, force in zip(carried, carried.values(), found, strict=True):
+        yield from steady(label, f", {second} on {first}", force.mean(), force, weight)
+    edge = float(sim.model.body_edge.numpy().min())
+    yield Figure(label, "deepest overlap [% of an edge]", 100.0 * overlap.max() / edge, most=0.1)
+    yield Figure(label, "kinetic energy at the end [J]", sim.measure().kinetic)
 
 
-def centre(label: str, ask: Ask) -> Iterator[Figure]:
+def centre(label: str, ask: Ask) -> Figures:
     """Moment balance about the centre of mass, from the pressure at the vertices."""
     scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=0.0)
     scene.add_plane((0.0, 0.0, 1.0), 0.0)
-    sim, frames = settled(cube(scene, 0.0), ask)
-    mass = sim.model.mass.numpy().astype(float)
-    off, total = [], []
-    for _ in frames:
-        force = sim.contact_fields()["pressure"] * vertex_areas(sim)
-        x = sim.positions().astype(float)
-        off.append((force @ x - force.sum() * (mass @ x) / mass.sum())[:2])
-        total.append(force.sum())
-    arm = np.linalg.norm(np.mean(off, axis=0)) / np.mean(total)
-    yield zero(label, "offset from the centre of mass [of an edge]", arm / check.EDGE, CENTRE)
-    yield relative(label, "sum of the nodal forces [N]", np.mean(total), WEIGHT, FORCE)
+    scene.add_body(wc.box(EDGE, 3), rubber(), (0.0, 0.0, 0.5 * EDGE))
+    sim = settled(ask, scene)
+    mass = masses(sim)
+
+    def look() -> tuple[float, ...]:
+        force, x = sim.contact_fields()["pressure"] * vertex_areas(sim), sim.positions()
+        moment = force @ x.astype(float) - force.sum() * (mass @ x) / mass.sum()
+        return *moment[:2], force.sum()
+
+    *moment, total = watch(sim, SAMPLE, look).mean(axis=0)
+    arm = np.linalg.norm(moment) / total
+    yield zero(label, "offset from the centre of mass [of an edge]", arm / EDGE, CENTRE)
+    yield relative(label, "sum of the nodal forces [N]", total, WEIGHT, FORCE)
 
 
-def vertex_areas(sim: wc.Simulation) -> np.ndarray:
-    """A third of the surface around each vertex [m^2], shape (n_vert,)."""
-    tris, x = sim.model.tris.numpy(), sim.positions().astype(float)
-    a, b, c = np.moveaxis(x[tris], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(tris.ravel(), np.repeat(area, 3), minlength=len(x))
-
-
-def on_sheet(label: str, ask: Ask) -> Iterator[Figure]:
+def on_sheet(label: str, ask: Ask) -> Figures:
     """The block on a membrane held at its rim."""
     scene = wc.Scene(gravity=(0.0, 0.0, -G))
     sheet = wc.box(SHEET, SHEET_CELLS)
     rim = np.abs(sheet.vertices[:, :2]).max(axis=1) > 0.499 * SHEET[0]
-    material = wc.NeoHookean(20.0 * check.YOUNG, check.POISSON, check.DENSITY, check.DAMPING)
-    scene.add_body(sheet, material, fixed=rim, label="sheet")
-    sim, frames = settled(cube(scene, 0.5 * SHEET[2] + 1e-3), ask)
-    force = [sim.measure().forces.get(("sheet", "block"), 0.0) for _ in frames]
-    mean = float(np.mean(force))
-    yield relative(label, "mean force [N]", mean, WEIGHT, FORCE)
-    yield zero(label, "ripple of the force [of the mean]", np.std(force) / max(mean, 1e-9), RIPPLE)
+    scene.add_body(sheet, rubber(20.0), fixed=rim, label="sheet")
+    place = (0.0, 0.0, 0.5 * SHEET[2] + 1e-3 + 0.5 * EDGE)
+    scene.add_body(wc.box(EDGE, 3), rubber(), place, label="block")
+    sim = settled(ask, scene)
+    force = watch(sim, SAMPLE, lambda: forces(sim, ("sheet", "block")))
+    yield from steady(label, "", force.mean(), force, WEIGHT)
 
 
-def on_points(label: str, ask: Ask) -> Iterator[Figure]:
+def on_points(label: str, ask: Ask) -> Figures:
     """The block on three tips."""
     scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=GRIP)
     angle = 2.0 * np.pi * np.arange(3) / 3.0
     foot = 0.5 * SPIKE * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle - 2.0], axis=1)
     spike = wc.TetMesh(np.vstack([np.zeros((1, 3)), foot]), [[0, 1, 2, 3]])
-    material = wc.NeoHookean(check.YOUNG, check.POISSON, check.DENSITY)
+    material = wc.NeoHookean(YOUNG, POISSON, DENSITY)
     for k, (x, y) in enumerate(TIPS):
         scene.add_body(spike, material, (x, y, 0.0), fixed=True, label=f"tip{k}")
-    sim, frames = settled(cube(scene, 1e-4, 4, STIFF), ask, ON_TIP)
-    forces = np.zeros(3)
-    n = 0
-    for _ in frames:
-        now = sim.measure().forces
-        forces += [now.get((f"tip{k}", "block"), 0.0) for k in range(3)]
-        n += 1
-    mass, x = sim.model.mass.numpy()[12:].astype(float), sim.positions(3).astype(float)
+    scene.add_body(wc.box(EDGE, 4), rubber(STIFF), (0.0, 0.0, 1e-4 + 0.5 * EDGE), label="block")
+    sim = settled(ask, scene, ON_TIP)
+    pairs = [(f"tip{k}", "block") for k in range(3)]
+    mean = watch(sim, SAMPLE, lambda: forces(sim, *pairs)).mean(axis=0)
+    mass, x = masses(sim, 3), sim.positions(3).astype(float)
     at = (mass @ x / mass.sum())[:2]
     part = np.linalg.solve(np.vstack([TIPS.T, np.ones(3)]), [*at, 1.0])
-    for k, force in enumerate(forces / n):
+    for k, force in enumerate(mean):
         yield relative(label, f"mean force on tip {k} [N]", force, part[k] * WEIGHT, FORCE)
+
+
+def ladder(ask: Ask) -> Figures:
+    """A light cube below a heavy one; the quick run leaves out every second ratio."""
+    for ratio in MASSES[:: 2 if ask.quick else 1]:
+        yield from carry(ask, ratio)
+
+
+def cubes(ratio: float, young: float) -> Pile:
+    """Both, the centre of the light one at the origin."""
+    both = [
+        Column(young, EDGE, density, (n, n, n), (EDGE, EDGE))
+        for density, n in zip((DENSITY, ratio * DENSITY), CUBES, strict=True)
+    ]
+    return Pile(both, APART, -0.5 * EDGE, gravity=G, friction=0.3)
+
+
+def carry(ask: Ask, ratio: float) -> Figures:
+    """Mean and ripple of the force on the light cube's top, and the overlap there."""
+    label = f"A7m heavy on light, mass ratio {ratio:g}"
+    young = 20.0 * ratio * DENSITY * G * EDGE
+    pile = cubes(ratio, young)
+    sim = pile.simulate(ask, 0.0)
+    omega = float(np.sqrt(young * EDGE / (ratio * DENSITY * EDGE**3)))
+    force = rest(sim, omega, REST, lambda: between(sim), 0.5, LEAST)[:, 0]
+    blocks = force[: len(force) // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)
+    yield from steady(label, "", force.mean(), blocks, ratio * WEIGHT)
+    yield zero(label, "deepest overlap [of an edge]", sim.measure().overlap * CUBES[1] / EDGE)

@@ -19,6 +19,7 @@ import numpy as np
 
 from warp_contact.errors import UsageError
 from warp_contact.progress import Progress, announce
+from warp_contact.scene.scene import Scene
 from warp_contact.simulation import Simulation
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.usd.prims import parts
@@ -36,19 +37,12 @@ def run(args) -> int:
     n = args.frames or getattr(module, "FRAMES", 120)
     announce("loading the kernels (the first run compiles them)", args.quiet)
     try:
-        sim = Simulation(
-            scene,
-            response(module, args),
-            fps=args.fps,
-            substeps=args.substeps,
-            device=args.device,
-            sleeping=args.sleep,
-        )
-        view = getattr(module, "VIEW", None)
-        view = (view["eye"], view["target"]) if view else None
+        sim = simulation(module, scene, args)
         root = root_path(args.out)
         saved, metrics = root.with_name("checkpoint.npz"), root.with_name("metrics.jsonl")
         kept = go_on(sim, root, saved, metrics) if args.resume else 0
+        view = getattr(module, "VIEW", None)
+        view = (view["eye"], view["target"]) if view else None
         writer = UsdWriter(root, sim, flatten=args.flatten, view=view, resume=args.resume)
     except ValueError as error:
         raise UsageError(str(error)) from error
@@ -56,12 +50,30 @@ def run(args) -> int:
         os.truncate(metrics, kept)
     else:
         saved.unlink(missing_ok=True)
+    with writer, metrics.open("a" if args.resume else "w", encoding="utf-8") as log:
+        take_frames(sim, n, writer, log, saved, args)
+    if not args.quiet:
+        print(f"{writer.root}: frames {writer.start} to {writer.end}")
+        print(metrics)
+    return 0
+
+
+def simulation(module, scene: Scene, args) -> Simulation:
+    """The simulation that the command line asks for."""
+    return Simulation(
+        scene,
+        response(module, args),
+        fps=args.fps,
+        substeps=args.substeps,
+        device=args.device,
+        sleeping=args.sleep,
+    )
+
+
+def take_frames(sim: Simulation, n: int, writer: UsdWriter, log, saved: Path, args) -> None:
+    """Step to frame ``n``, write each frame, and a checkpoint now and then."""
     left = max(0, n - sim.frame)
-    with (
-        writer,
-        metrics.open("a" if args.resume else "w", encoding="utf-8") as log,
-        Progress(left, args.quiet) as line,
-    ):
+    with Progress(left, args.quiet) as line:
         if not args.resume:
             record(sim, writer, log)
             sim.save(saved)
@@ -72,10 +84,6 @@ def run(args) -> int:
             if frame == n or time.monotonic() - last >= SAVE_EVERY:
                 sim.save(saved)
                 last = time.monotonic()
-    if not args.quiet:
-        print(f"{writer.root}: frames {writer.start} to {writer.end}")
-        print(metrics)
-    return 0
 
 
 def go_on(sim, root: Path, saved: Path, metrics: Path) -> int:

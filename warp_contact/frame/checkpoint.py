@@ -9,7 +9,7 @@ import numpy as np
 
 from warp_contact.data.model import Model
 
-FORMAT = 3
+FORMAT = 4
 
 
 def fingerprint(model: Model, *settings) -> str:

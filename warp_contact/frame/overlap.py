@@ -4,7 +4,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.step import broad_phase, residual
-from warp_contact.step.look import look_at_vertices
+from warp_contact.step.detection import detect_vertices
 
 
 def overlaps(model: Model, state: State, work: Work) -> bool:
@@ -15,6 +15,6 @@ def overlaps(model: Model, state: State, work: Work) -> bool:
     work.dt.fill_(1.0)
     work.overflow.all.zero_()
     broad_phase.refresh(model, state.x, state.x, work)
-    look_at_vertices(model, state.x, state.x, work)
+    detect_vertices(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     return bool(work.surface.any_old.numpy()[0])

@@ -16,7 +16,7 @@ CHUNK = 64  # vertices summed by one thread
 FIRST, LATER = (3, 8), (1, 2)  # fewest and most restarts in the first call, in later calls
 NOISE = 0.1  # random part of a restart, so that a mode elsewhere can come up
 SECOND = 0.3  # part of the second mode in a restart, so that it can overtake
-TOLERANCE = 0.02  # gap between the estimate and its bound that ends the restarts, of lambda
+CONVERGED = 0.02  # gap between the estimate and its bound that ends the restarts, of lambda
 LITTLE = 0.01  # change of shape, see elastic/shape.py, that moves a rate by some percent at most
 MUCH = 0.2  # change that makes a frequency at most SLOWER times as large, a damping its square
 SLOWER = 4.0
@@ -161,7 +161,7 @@ class Spectrum:
             theta, residual, ritz = _ritz_pairs(coef)
             self._restart(ritz)
             bound = theta + residual
-            if cycle + 1 >= fewest and bound.max() <= (1.0 + TOLERANCE) * theta.max():
+            if cycle + 1 >= fewest and bound.max() <= (1.0 + CONVERGED) * theta.max():
                 break
         wp.copy(self._start[apply], self._basis[0])
         return bound

@@ -14,6 +14,7 @@ within ``forces.reach``; a frame that fails is repeated at the rates found there
 
 import math
 
+from warp_contact.kernels.lengths import LINGERING, TRAVEL
 from warp_contact.step.forces import longest_step, reach, share_for, stages_for
 
 SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
@@ -22,8 +23,6 @@ RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
 CUT_SHORT = 2.0  # the same, in one whose steps were seen to be too long before its end
 EXPLODED = 4.0  # times the frequency that the step was long enough for, at most
 REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
-TRAVEL = 0.1  # of the shortest mean edge: the same, for the tets where something strikes
-LINGERING = 0.025  # as TRAVEL, where overlaps may last some steps
 PATIENCE = 2.0  # stable steps, at most, that both are worth
 BLURRED = 1.05  # times the stable step: how well that is known
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 let some pass

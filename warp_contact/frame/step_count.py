@@ -10,8 +10,8 @@ from warp_contact.frame.diagnosis import flattest_tet
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 
-class Pace:
-    """What ``substeps`` needs to know of one scene; the formulas are there.
+class StepCount:
+    """What step_bounds.py needs to know of one scene; the formulas are there.
 
     Attributes:
         fps: frames per second
@@ -37,7 +37,7 @@ class Pace:
         self._world = of_bodies[model.vert_body.numpy()]
         self._largest_inv_mass = float(model.inv_mass.numpy().max())
 
-    def steps(self, state: State, omega: float, last: int, frame: int, search: bool) -> int:
+    def steps(self, state: State, omega: float, last: int, frame: int, overlapping: bool) -> int:
         """Steps of frame number ``frame``, after one of ``last`` steps.
 
         Args:
@@ -45,7 +45,7 @@ class Pace:
             omega: largest frequency of the elastic forces [1/s]
             last: steps of the frame before
             frame: its number, for the message
-            search: whether there may be overlaps that no step created
+            overlapping: whether there may be overlaps that no step created
 
         Raises:
             SimulationError: no step is stable
@@ -57,7 +57,7 @@ class Pace:
             return self.wanted
         omega, speed = self._with_response(omega), self._speed(state)
         sizes = self._thickness, self._edge
-        per_second = step_bounds.steps_per_second(omega, speed, *sizes, search or self._leaves)
+        per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlapping or self._leaves)
         return step_bounds.steps_in_frame(per_second, self.fps, last)
 
     def check(self, state: State, omega: float, frame: int) -> None:

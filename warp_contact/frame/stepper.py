@@ -26,14 +26,14 @@ from warp_contact.frame.step_bounds import (
     stays_damped,
     stays_stable,
 )
-from warp_contact.frame.step_count import Pace
+from warp_contact.frame.step_count import StepCount
 from warp_contact.step.forces import share_for, stages_for
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.motion import kick
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 NEIGHBOURS = 8  # pairs with a contact force for each body that there is room for at first
-UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
+IMPULSE_UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
 HALVED = 3  # times that the steps of a frame are halved because its state, or stiffness, is lost
 NO_RATES = math.inf, math.inf  # of a state that is lost
 PART = 8  # steps between two looks at the rates, in frames that begin or end with a flat tet
@@ -49,9 +49,9 @@ class Stepper:
         n: steps of the last frame
         dt: their length [s], None before the first
         rates: largest elastic frequency and damping rate at its end [1/s], None where to be found
-        search: whether there may be overlaps that no step created; None where nobody has looked
+        overlapping: whether there may be overlaps that no step created; None where it is not known
         work: buffers, with the contacts of the last step
-        rest: who sleeps; None where nobody may
+        sleeping: who sleeps; None where nobody may
         spectrum: finds the rates
         unit: resolution of the recorded contact impulses [N s]
     """
@@ -70,16 +70,16 @@ class Stepper:
         self.n = 0
         self.dt: float | None = None
         self.rates: tuple[float, float] | None = None
-        self.search: bool | None = None
+        self.overlapping: bool | None = None
         self._model, self._state, self._response = model, state, response
-        self._pace = Pace(model, response, fps, wanted)
+        self._step_count = StepCount(model, response, fps, wanted)
         self.spectrum = Spectrum(model)
         # Without weight, what hardly moves need not be held by anything: it flies.
-        sleeping = sleeping and any(model.gravity)
-        self.rest = Sleeping(model, state, fps) if sleeping else None
+        may_sleep = sleeping and any(model.gravity)
+        self.sleeping = Sleeping(model, state, fps) if may_sleep else None
         inv_mass = model.inv_mass.numpy()
         mobile = float(model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
-        self.unit = UNIT * (mobile if mobile > 0.0 else 1.0)
+        self.unit = IMPULSE_UNIT * (mobile if mobile > 0.0 else 1.0)
         pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
         self.work: Work = self._allocate(Capacity(pairs=pairs))
         self._graphs: dict[tuple[int, bool], wp.Graph] = {}
@@ -97,17 +97,31 @@ class Stepper:
             SimulationError: no step is stable, or the state does not stay finite; it is then that
                 of the last finished frame
         """
-        if self.rest and self.search is False:  # an overlap that is left has to be searched
-            if not self.rest.update(self._state, self.work):
-                self.rest.skip_frame(self._state, self.work)
-                return
+        if self._all_sleep():
+            return
         wp.copy(self._saved.x, self._state.x)
         wp.copy(self._saved.v, self._state.v)
         warm_start.copy(self._saved_warm, self.work.warm)
-        while self.search is None or self.grow():
-            self.search = overlaps(self._model, self._state, self.work)
+        while self.overlapping is None or self.grow():
+            self.overlapping = overlaps(self._model, self._state, self.work)
+        self.dt, self.rates = self._find_step(frame)
+        self.overlapping = self.overlapping and bool(self.work.surface.was_old.numpy()[0])
+
+    def _all_sleep(self) -> bool:
+        """Decide who sleeps; where all do, nothing moves in this frame."""
+        if (
+            not self.sleeping or self.overlapping is not False
+        ):  # an overlap that is left has to be searched
+            return False
+        if self.sleeping.update(self._state, self.work):
+            return False
+        self.sleeping.skip_frame(self._state, self.work)
+        return True
+
+    def _find_step(self, frame: int) -> tuple[float, tuple[float, float]]:
+        """Step the frame, again and again until its step fits; the step [s] and the last rates."""
         omega, rate = self.rates or self.spectrum.rates(self._state.x)
-        self._pace.check(self._state, omega, frame)
+        self._step_count.check(self._state, omega, frame)
         last, halved = self.n, 0
         in_parts = self._flat()
         for _ in range(ATTEMPTS):
@@ -117,7 +131,7 @@ class Stepper:
             fits = not wrong and self._fits(dt, rate, after)
             flat = in_parts or bool(wrong) or self._flat()
             if fits and (in_parts or not flat):
-                break
+                return dt, after
             self._go_back()
             if wrong:
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
@@ -128,11 +142,7 @@ class Stepper:
                 least = CUT_SHORT if in_parts else RAISED
                 omega, rate = raised((omega, rate), after, dt, least)
             in_parts = flat
-        else:
-            raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
-        self.rates = after
-        self.dt = dt
-        self.search = self.search and bool(self.work.surface.was_old.numpy()[0])
+        raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
 
     def _look(self) -> tuple[tuple[float, float], str]:
         """Rates of the present state [1/s], and what is wrong with it: empty where nothing is."""
@@ -156,10 +166,10 @@ class Stepper:
 
     def look_anew(self) -> None:
         """Before the next frame: positions were set from outside."""
-        self.search = None
+        self.overlapping = None
         self.rates = None
-        if self.rest:
-            self.rest.wake_all(self.work)
+        if self.sleeping:
+            self.sleeping.wake_all(self.work)
 
     def use(self, work: Work) -> None:
         """Go on in other buffers."""
@@ -175,7 +185,7 @@ class Stepper:
         self._go_back()
         forces = self.work.forces
         self._replace_work(capacity)
-        if self.rest:
+        if self.sleeping:
             keep_forces(forces, self.work.forces)
         return True
 
@@ -184,10 +194,12 @@ class Stepper:
         values = {"substeps": np.array(self.n)}
         values |= {f"start.{k}": start for k, start in self.spectrum.starts().items()}
         values |= {f"warm.{k}": value for k, value in warm_start.values(self.work.warm).items()}
-        if self.rest:
-            values |= {f"rest.{k}": value for k, value in self.rest.values(self.work).items()}
-        if self.search is not None:
-            values |= {"search": np.array(self.search)}
+        if self.sleeping:
+            values |= {
+                f"sleeping.{k}": value for k, value in self.sleeping.values(self.work).items()
+            }
+        if self.overlapping is not None:
+            values |= {"overlapping": np.array(self.overlapping)}
         if self.dt is not None:
             values |= {"dt": np.array(self.dt)}
         if self.rates is not None:
@@ -198,16 +210,16 @@ class Stepper:
         """Take over the ``values`` of another one of the same scene and settings."""
         self.n = int(values["substeps"])
         self.spectrum.start_from(checkpoint.part(values, "start"))
-        rest = checkpoint.part(values, "rest")
+        sleeping = checkpoint.part(values, "sleeping")
         impulses = checkpoint.part(values, "warm")
         have = self.work.capacity
-        pairs = max(have.pairs, len(rest.get("pair_key", ())))
+        pairs = max(have.pairs, len(sleeping.get("pair_key", ())))
         contacts = max(have.contacts, len(impulses["edges"]))
         self._replace_work(replace(have, pairs=pairs, contacts=contacts))
         warm_start.restore(self.work.warm, impulses)
-        if self.rest:
-            self.rest.restore(rest, self.work)
-        self.search = bool(values["search"]) if "search" in values else None
+        if self.sleeping:
+            self.sleeping.restore(sleeping, self.work)
+        self.overlapping = bool(values["overlapping"]) if "overlapping" in values else None
         self.dt = float(values["dt"]) if "dt" in values else None
         self.rates = tuple(map(float, values["rates"])) if "rates" in values else None
 
@@ -220,13 +232,13 @@ class Stepper:
         step does not fit any more; where the buffers were outgrown, nothing was found.
         """
         work = self.work
-        if self.rest:
-            self.rest.begin_frame(self._state, work)
+        if self.sleeping:
+            self.sleeping.begin_frame(self._state, work)
         else:
             work.forces.received.zero_()
             work.forces.pair_key.fill_(-1)
             work.forces.pair_total.zero_()
-        n = self._pace.steps(self._state, omega, last, frame, bool(self.search))
+        n = self._step_count.steps(self._state, omega, last, frame, bool(self.overlapping))
         dt = 1.0 / (self.fps * n)
         stages = stages_for(rate, dt)
         if self.dt is not None and dt != self.dt:
@@ -252,16 +264,16 @@ class Stepper:
 
     def _graph(self, stages: int) -> wp.Graph:
         """The captured steps of a frame, with so many stages of damping."""
-        key = stages, self.search
+        key = stages, self.overlapping
         if key not in self._graphs:
-            one = step_of(self._response, bool(self.search))
+            one = step_of(self._response, bool(self.overlapping))
             with wp.ScopedCapture() as capture:
                 take_steps(self._model, self._state, self.work, stages, one)
             self._graphs[key] = capture.graph
         return self._graphs[key]
 
     def _allocate(self, capacity: Capacity) -> Work:
-        awake = self.rest.awake if self.rest else None
+        awake = self.sleeping.awake if self.sleeping else None
         return allocate_work(self._model, self._state, capacity, awake, self.unit)
 
     def _replace_work(self, capacity: Capacity) -> None:

@@ -8,14 +8,13 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
+from warp_contact.kernels.lengths import UNHELD
 from warp_contact.kernels.motion import motion
 from warp_contact.kernels.output import measure as kernels
 from warp_contact.measure.trees import Trees
 from warp_contact.measure.tunnelling import Tunnelling
 from warp_contact.scene import topology
 from warp_contact.step.forces import energies, internal_forces
-
-UNHELD = 0.01  # of the mean edge of a vertex's body: what is less deep needs no contact
 
 
 @dataclass(frozen=True)

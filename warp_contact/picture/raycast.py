@@ -8,7 +8,7 @@ import warp as wp
 from warp_contact.kernels.output import raycast as kernels
 from warp_contact.usd.prims import FOV, GROUND, linear
 
-CREASE = 60.0  # edges with a sharper angle than this stay sharp [degrees]
+CREASE_ANGLE = 60.0  # edges with a sharper angle than this stay sharp [degrees]
 SUN = (-0.45, -0.55, 1.0)  # toward the sun
 
 
@@ -88,7 +88,7 @@ class Renderer:
     def corner_normals(self, x: wp.array) -> wp.array:
         """Normals of the corners of the triangles, shape (3 n_tri,)."""
         normal = wp.empty(3 * len(self.tri), dtype=wp.vec3)
-        crease = float(np.cos(np.radians(CREASE)))
+        crease = float(np.cos(np.radians(CREASE_ANGLE)))
         inputs = [self.tri, self.start, self.around, self.rest, self._areas(x), crease]
         wp.launch(kernels.set_corner_normals, dim=len(normal), inputs=inputs, outputs=[normal])
         return normal

@@ -14,7 +14,7 @@ from warp_contact.usd.prims import FOV, PALETTE, linear
 from warp_contact.usd.reader import frame_numbers, open_stage, read_note, read_planes, read_view
 
 DIRECTION = (0.55, -1.0, 0.5)  # from the scene toward an automatic camera
-MARGIN = 1.12  # room around the scene in an automatic view
+VIEW_MARGIN = 1.12  # room around the scene in an automatic view
 
 
 def render(
@@ -49,30 +49,38 @@ def render(
         device: Warp device
         report: called with each path as it is written
     """
-    stage = stage if isinstance(stage, Usd.Stage) else open_stage(stage)
+    if not isinstance(stage, Usd.Stage):
+        stage = open_stage(stage)
     every, drawing = frame_numbers(stage), Drawing.of(stage)
-    frames = every if frames is None else list(frames)
-    absent = [frame for frame in frames if frame not in every]
-    if absent:
-        raise ValueError(f"no frame {absent[0]}: the file has {every[0]} to {every[-1]}")
+    frames = chosen_frames(frames, every)
     low, high = drawing.bounds(every)
     camera = chosen_camera(read_view(stage), eye, target, low, high, size[0] / size[1])
-    planes = read_planes(stage)
-    if floor and not planes:
-        planes = [(np.array([0.0, 0.0, 1.0]), float(low[2]))]
-    out_dir, paths = Path(out_dir), []
-    out_dir.mkdir(parents=True, exist_ok=True)
+    planes = read_planes(stage) or ([(np.array([0.0, 0.0, 1.0]), float(low[2]))] if floor else [])
+    center, reach = 0.5 * (low + high), float(np.linalg.norm(high - low))
     with wp.ScopedDevice(device):
         rest = drawing.points(every[0])
         renderer = Renderer(drawing.tris, rest, planes, size, samples, rays, wire)
-        reach, center = float(np.linalg.norm(high - low)), 0.5 * (low + high)
-        for frame in frames:
-            points, colors = drawing.points(frame), drawing.colors(frame)
-            paths.append(out_dir / f"{frame:06d}.png")
-            write_png(paths[-1], renderer.picture(points, colors, camera, center, reach))
-            if report is not None:
-                report(paths[-1])
+        return draw(drawing, frames, renderer, (camera, center, reach), Path(out_dir), report)
+
+
+def draw(drawing, frames: list[int], renderer: Renderer, view: tuple, out_dir: Path, report):
+    """Draw and write each frame in a view; give the paths."""
+    paths = [out_dir / f"{frame:06d}.png" for frame in frames]
+    out_dir.mkdir(parents=True, exist_ok=True)
+    for frame, path in zip(frames, paths, strict=True):
+        write_png(path, renderer.picture(drawing.points(frame), drawing.colors(frame), *view))
+        if report is not None:
+            report(path)
     return paths
+
+
+def chosen_frames(frames: Iterable[int] | None, every: range) -> list[int]:
+    """The frames asked for, or all; raises ValueError for one that is not there."""
+    chosen = list(every if frames is None else frames)
+    absent = [frame for frame in chosen if frame not in every]
+    if absent:
+        raise ValueError(f"no frame {absent[0]}: the file has {every[0]} to {every[-1]}")
+    return chosen
 
 
 @dataclass(frozen=True)
@@ -158,7 +166,7 @@ def fitting_camera(low: np.ndarray, high: np.ndarray, aspect: float) -> Camera:
     back = np.array(DIRECTION) / np.linalg.norm(DIRECTION)
     right, up, forward = Camera(target + back, target).axes()
     corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3) - target
-    slope = np.tan(np.radians(FOV) / 2.0) / MARGIN
+    slope = np.tan(np.radians(FOV) / 2.0) / VIEW_MARGIN
     across = np.abs(corners @ right) / (slope * aspect) - corners @ forward
     upward = np.abs(corners @ up) / slope - corners @ forward
     return Camera(target + back * max(across.max(), upward.max(), 1e-6), target)

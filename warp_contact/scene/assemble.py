@@ -19,39 +19,11 @@ def assemble(scene: Scene) -> tuple[Model, State]:
     if not bodies:
         raise ValueError("the scene has no body")
     placement.check(bodies)
-    meshes = [body.mesh for body in bodies]
-    vert0 = _prefix(len(mesh.vertices) for mesh in meshes)
-    tet0 = _prefix(len(mesh.tets) for mesh in meshes)
-    tri0 = _prefix(len(mesh.surface) for mesh in meshes)
-    n_vert, n_tet, n_tri = int(vert0[-1]), int(tet0[-1]), int(tri0[-1])
-
     x = np.concatenate([body.x for body in bodies])
-    tets = np.concatenate([m.tets + i for m, i in zip(meshes, vert0, strict=False)])
-    tris = np.concatenate([m.surface + i for m, i in zip(meshes, vert0, strict=False)])
-    edges = np.concatenate(
-        [
-            m.surface_edges + np.array([i, i, t, t], dtype=np.int32)
-            for m, i, t in zip(meshes, vert0, tri0, strict=False)
-        ]
-    )
-    links = np.concatenate([m.edges + i for m, i in zip(meshes, vert0, strict=False)])
-    volume = np.concatenate([m.volumes for m in meshes])
-    mass = np.zeros(n_vert)
-    density = np.repeat([body.material.density for body in bodies], np.diff(tet0))
-    np.add.at(mass, tets.ravel(), np.repeat(density * volume / 4.0, 4))
-    fixed = np.concatenate([body.fixed for body in bodies])
-    corner = x[tets]
-    pose = np.linalg.inv(np.swapaxes(corner[:, 1:] - corner[:, :1], 1, 2))
-    surf = np.unique(tris)
-    on_surface = np.zeros(n_vert, dtype=np.int32)
-    on_surface[surf] = 1
-    lengths = [np.linalg.norm(np.diff(m.vertices[m.edges], axis=1), axis=2) for m in meshes]
-    vt_start, vt_corner = _incidence(tets, n_vert, by_entry=True)
-    vs_start, vs_tri = _incidence(tris, n_vert)
-    ends = np.concatenate([links, links[:, ::-1]])
-    ends = ends[np.lexsort((ends[:, 1], ends[:, 0]))]
-
-    of_tet = np.repeat(np.arange(len(bodies)), np.diff(tet0))
+    v = np.concatenate([body.v for body in bodies])
+    tets = _joined(bodies, "tets")
+    tris = _joined(bodies, "surface")
+    tet0 = _first(bodies, "tets")
     model = Model(
         labels=tuple(body.label for body in bodies),
         materials=tuple(body.material for body in bodies),
@@ -59,42 +31,107 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         gravity=scene.gravity,
         friction=scene.friction,
         n_body=len(bodies),
-        n_vert=n_vert,
-        n_tet=n_tet,
-        n_tri=n_tri,
-        n_edge=len(edges),
-        n_surf=len(surf),
+        n_vert=len(x),
+        n_tet=len(tets),
+        n_tri=len(tris),
         n_plane=len(scene.planes),
-        cell=float(np.concatenate(lengths).mean()),
-        body_vert=_ints(vert0),
-        body_tet=_ints(tet0),
-        body_tri=_ints(tri0),
-        body_world=_ints([body.world for body in bodies]),
-        body_edge=_floats([length.mean() for length in lengths]),
-        body_thickness=_floats([_thickness(mesh) for mesh in meshes]),
-        vert_body=_ints(np.repeat(np.arange(len(bodies)), np.diff(vert0))),
-        mass=_floats(mass),
-        inv_mass=_floats(np.where(fixed, 0.0, 1.0 / mass)),
-        surf=_ints(surf),
-        on_surface=_ints(on_surface),
-        tets=wp.array(tets, dtype=wp.vec4i),
-        tet_body=_ints(np.concatenate([of_tet, len(bodies) + np.arange(len(scene.planes))])),
-        pose=wp.array(pose, dtype=wp.mat33),
-        volume=_floats(volume),
-        tris=wp.array(tris, dtype=wp.vec3i),
-        tri_body=_ints(np.repeat(np.arange(len(bodies)), np.diff(tri0))),
-        edges=wp.array(edges, dtype=wp.vec4i),
-        vt_start=vt_start,
-        vt_corner=vt_corner,
-        vs_start=vs_start,
-        vs_tri=vs_tri,
-        vn_start=_ints(_prefix(np.bincount(ends[:, 0], minlength=n_vert))),
-        vn_vert=_ints(ends[:, 1]),
+        **_of_bodies(bodies),
+        **_of_tets(scene, x, tets, tet0),
+        **_of_surface(bodies, tris, len(x)),
+        **_neighbours(bodies, len(x)),
         plane_n=wp.array(np.array([n for n, _ in scene.planes]).reshape(-1, 3), dtype=wp.vec3),
         plane_h=_floats([h for _, h in scene.planes]),
     )
-    v = np.concatenate([body.v for body in bodies])
     return model, State(x=wp.array(x, dtype=wp.vec3), v=wp.array(v, dtype=wp.vec3))
+
+
+def _first(bodies: list, part: str) -> np.ndarray:
+    """Number of the first vertex, tet or surface triangle of each body, closed by their count."""
+    return _prefix(len(getattr(body.mesh, part)) for body in bodies)
+
+
+def _joined(bodies: list, part: str) -> np.ndarray:
+    """Cells of all meshes, over the vertices of all."""
+    first = _first(bodies, "vertices")
+    return np.concatenate([getattr(b.mesh, part) + i for b, i in zip(bodies, first, strict=False)])
+
+
+def _of_bodies(bodies: list) -> dict:
+    """Ranges, sizes and worlds of the bodies."""
+    meshes = [body.mesh for body in bodies]
+    vert0 = _first(bodies, "vertices")
+    lengths = [np.linalg.norm(np.diff(m.vertices[m.edges], axis=1), axis=2) for m in meshes]
+    return {
+        "cell": float(np.concatenate(lengths).mean()),
+        "body_vert": _ints(vert0),
+        "body_tet": _ints(_first(bodies, "tets")),
+        "body_tri": _ints(_first(bodies, "surface")),
+        "body_world": _ints([body.world for body in bodies]),
+        "body_edge": _floats([length.mean() for length in lengths]),
+        "body_thickness": _floats([_thickness(mesh) for mesh in meshes]),
+        "vert_body": _ints(np.repeat(np.arange(len(bodies)), np.diff(vert0))),
+    }
+
+
+def _of_tets(scene: Scene, x: np.ndarray, tets: np.ndarray, tet0: np.ndarray) -> dict:
+    """The tets, their rest shapes, and the masses that they give to their vertices."""
+    bodies = scene.bodies
+    volume = np.concatenate([body.mesh.volumes for body in bodies])
+    density = np.repeat([body.material.density for body in bodies], np.diff(tet0))
+    mass = np.zeros(len(x))
+    np.add.at(mass, tets.ravel(), np.repeat(density * volume / 4.0, 4))
+    fixed = np.concatenate([body.fixed for body in bodies])
+    corner = x[tets]
+    pose = np.linalg.inv(np.swapaxes(corner[:, 1:] - corner[:, :1], 1, 2))
+    of_tet = np.repeat(np.arange(len(bodies)), np.diff(tet0))
+    vt_start, vt_corner = _incidence(tets, len(x), by_entry=True)
+    return {
+        "mass": _floats(mass),
+        "inv_mass": _floats(np.where(fixed, 0.0, 1.0 / mass)),
+        "tets": wp.array(tets, dtype=wp.vec4i),
+        "tet_body": _ints(np.concatenate([of_tet, len(bodies) + np.arange(len(scene.planes))])),
+        "pose": wp.array(pose, dtype=wp.mat33),
+        "volume": _floats(volume),
+        "vt_start": vt_start,
+        "vt_corner": vt_corner,
+    }
+
+
+def _of_surface(bodies: list, tris: np.ndarray, n_vert: int) -> dict:
+    """Surface vertices, triangles and edges."""
+    vert0, tri0 = _first(bodies, "vertices"), _first(bodies, "surface")
+    edges = np.concatenate(
+        [
+            body.mesh.surface_edges + np.array([i, i, t, t], dtype=np.int32)
+            for body, i, t in zip(bodies, vert0, tri0, strict=False)
+        ]
+    )
+    surf = np.unique(tris)
+    on_surface = np.zeros(n_vert, dtype=np.int32)
+    on_surface[surf] = 1
+    vs_start, vs_tri = _incidence(tris, n_vert)
+    return {
+        "n_edge": len(edges),
+        "n_surf": len(surf),
+        "surf": _ints(surf),
+        "on_surface": _ints(on_surface),
+        "tris": wp.array(tris, dtype=wp.vec3i),
+        "tri_body": _ints(np.repeat(np.arange(len(bodies)), np.diff(tri0))),
+        "edges": wp.array(edges, dtype=wp.vec4i),
+        "vs_start": vs_start,
+        "vs_tri": vs_tri,
+    }
+
+
+def _neighbours(bodies: list, n_vert: int) -> dict:
+    """The vertices that each one is joined to by an edge of a tet, ascending."""
+    links = _joined(bodies, "edges")
+    ends = np.concatenate([links, links[:, ::-1]])
+    ends = ends[np.lexsort((ends[:, 1], ends[:, 0]))]
+    return {
+        "vn_start": _ints(_prefix(np.bincount(ends[:, 0], minlength=n_vert))),
+        "vn_vert": _ints(ends[:, 1]),
+    }
 
 
 def _elements(scene: Scene, tet0: np.ndarray) -> tuple[Elements, ...]:

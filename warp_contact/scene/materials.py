@@ -21,7 +21,7 @@ import numpy as np
 from warp_contact.kernels.elastic import corotated, neo_hookean, springs
 from warp_contact.scene.topology import EDGES
 
-FACES = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))  # opposite to corners 0, 1, 2, 3
+OPPOSITE = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))  # opposite to corners 0, 1, 2, 3
 
 
 def _check_common(material) -> None:
@@ -117,9 +117,9 @@ class SpringNetwork:
         """Return the row described in ``elastic/springs.py`` for each tet, shape (n, 22)."""
         x = np.asarray(vertices, dtype=np.float64)[np.asarray(tets)]  # (n, 4, 3)
         d = np.stack([x[:, j] - x[:, i] for i, j in EDGES], axis=1)
-        abc = np.stack([x[:, face] for face in map(list, FACES)], axis=1)  # (n, 4, 3, 3)
+        abc = np.stack([x[:, face] for face in map(list, OPPOSITE)], axis=1)  # (n, 4, 3, 3)
         normal = np.cross(abc[:, :, 1] - abc[:, :, 0], abc[:, :, 2] - abc[:, :, 0])
-        shared = _multiplicity(tets, FACES) > 1
+        shared = _multiplicity(tets, OPPOSITE) > 1
         row = [
             self.distance / _multiplicity(tets, EDGES),
             np.linalg.norm(d, axis=-1),

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from warp_contact.kernels.narrow_phase.contact import REST
+from warp_contact.kernels.lengths import REST_GAP, SAME_PLACE
 
 ROUNDING = 2.0**-24  # of a float32, at most
 DROWNED = 10.0  # gaps at rest, by which rounding may move a body: soft ones take it
-SAME = 1e-3  # of an edge: surfaces nearer than this to each other do not show an overlap to search
 
 
 def check(bodies: list) -> None:
@@ -19,14 +18,14 @@ def check(bodies: list) -> None:
     """
     edges = [_mean_edge(body) for body in bodies]
     for body, edge in zip(bodies, edges, strict=True):
-        far, most = float(np.abs(body.x).max()), DROWNED * REST * edge / ROUNDING
+        far, most = float(np.abs(body.x).max()), DROWNED * REST_GAP * edge / ROUNDING
         if far > most:
             raise ValueError(
                 f"body '{body.label}' is {far:.4g} m from the origin: beyond {most:.4g} m, "
                 f"rounding is {DROWNED:g} times its gap at rest; place the scene about the origin"
             )
     shape = np.array([_shape(body) for body in bodies])
-    slack = SAME * np.array(edges)
+    slack = SAME_PLACE * np.array(edges)
     world = np.array([body.world for body in bodies])
     held = np.array([bool(np.all(body.fixed)) for body in bodies])
     mix = np.sqrt(np.arange(2.0, 2.0 + shape.shape[1]))

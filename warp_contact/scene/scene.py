@@ -83,11 +83,7 @@ class Scene:
         Raises:
             ValueError: naming the body, for input that cannot be simulated
         """
-        label = f"body{len(self.bodies)}" if label is None else str(label)
-        if label in self._labels:
-            raise ValueError(f"body '{label}': another body has this label")
-        if PLANE.fullmatch(label):
-            raise ValueError(f"body '{label}': this is how a half-space is called")
+        label = self._new_label(label)
         try:
             if not isinstance(mesh, TetMesh):
                 raise ValueError(f"mesh is a {type(mesh).__name__}, not a TetMesh")
@@ -105,6 +101,15 @@ class Scene:
         self.bodies.append(body)
         self._labels.add(label)
         return body
+
+    def _new_label(self, label: str | None) -> str:
+        """A label that no body has; raises ValueError for one that is taken or that of a plane."""
+        label = f"body{len(self.bodies)}" if label is None else str(label)
+        if label in self._labels:
+            raise ValueError(f"body '{label}': another body has this label")
+        if PLANE.fullmatch(label):
+            raise ValueError(f"body '{label}': this is how a half-space is called")
+        return label
 
     def add_plane(self, normal, offset: float = 0.0) -> None:
         """Keep every body in the half-space normal . x >= offset [m]."""

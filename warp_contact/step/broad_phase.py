@@ -11,6 +11,7 @@ from warp_contact.data import boxes
 from warp_contact.data.broad_phase import Pairs
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.broad_phase import edges, hashing, near, skins
 from warp_contact.kernels.broad_phase import pairs as kernels
@@ -19,6 +20,8 @@ from warp_contact.kernels.broad_phase import pairs as kernels
 def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     """Find the pairs at ``x0`` unless those at hand hold for a step from ``x0`` to ``x1``."""
     b = work.broad_phase
+    if not on("broad phase kept"):
+        b.stale.fill_(1)
     wp.launch(
         skins.moved,
         dim=model.n_vert,

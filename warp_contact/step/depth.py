@@ -4,6 +4,7 @@ import warp as wp
 
 from warp_contact.data.launch import launch_over, while_any
 from warp_contact.data.model import Model
+from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.narrow_phase import depth as kernels
 
@@ -17,7 +18,8 @@ def find_depths(model: Model, x: wp.array, work: Work) -> None:
         inputs=[work.mesh, x, work.broad_phase.verts.list.start, n.inside_at],
         outputs=[n.penetration, n.pending],
     )
-    while_any(n.pending, _fill_layer, x, work)
+    if on("layers"):
+        while_any(n.pending, _fill_layer, x, work)
 
 
 def _fill_layer(x: wp.array, work: Work) -> None:

@@ -7,8 +7,8 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.kernels.motion import motion
 
-MARGIN = 1.1  # on the damping rate, which is estimated and grows within a frame
-ROOM = 0.95  # of the range of the stages that is used: at its end they do not damp
+RATE_MARGIN = 1.1  # on the damping rate, which is estimated and grows within a frame
+USED_RANGE = 0.95  # of the range of the stages that is used: at its end they do not damp
 SHARE = 0.5, 7.0 / 9.0  # least and largest: modes turn round at a sixth of their speed at most
 
 
@@ -98,16 +98,16 @@ def damp(
 
 def stages_for(rate: float, dt: float) -> int:
     """Return the stages that ``damp`` needs for lambda_max ``rate`` [1/s] and step ``dt`` [s]."""
-    z = MARGIN * rate * dt
+    z = RATE_MARGIN * rate * dt
     if z <= reach(1, SHARE[1]):
         return 1 if z > 0.0 else 0
-    return max(2, math.ceil(0.5 * (math.sqrt(1.0 + 4.0 * z / (ROOM * SHARE[1])) - 1.0)))
+    return max(2, math.ceil(0.5 * (math.sqrt(1.0 + 4.0 * z / (USED_RANGE * SHARE[1])) - 1.0)))
 
 
 def share_for(rate: float, dt: float) -> float:
     """Return the least share that reaches then: with less, fast modes turn round less."""
     stages = stages_for(rate, dt)
-    needed = MARGIN * rate * dt / reach(stages, 1.0) if stages > 1 else 0.0
+    needed = RATE_MARGIN * rate * dt / reach(stages, 1.0) if stages > 1 else 0.0
     return max(SHARE[0], needed)
 
 
@@ -116,13 +116,13 @@ def reach(stages: int, share: float) -> float:
 
     One stage has p = 1 - z whatever its share, above 0 up to 1.
     """
-    return float(stages) if stages < 2 else ROOM * share * (stages * stages + stages)
+    return float(stages) if stages < 2 else USED_RANGE * share * (stages * stages + stages)
 
 
 def longest_step(stages: int, share: float) -> float:
     """Longest stable step times the frequency of a mode, whichever way it is damped.
 
-    (h w)^2 < 2 (1 + p) with the least p of motion/motion.py, as P_s >= -1/2 within ``ROOM``, or
-    with p = 0 where that is less.
+    (h w)^2 < 2 (1 + p) with the least p of motion/motion.py, as P_s >= -1/2 within ``USED_RANGE``,
+    or with p = 0 where that is less.
     """
     return 2.0 if stages == 0 else math.sqrt(2.0 if stages == 1 else min(2.0, 4.0 - 3.0 * share))

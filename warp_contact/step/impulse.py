@@ -7,15 +7,16 @@ import warp as wp
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
+from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import constraint, pair_impulses
 from warp_contact.kernels.impulse import impulse as kernels
+from warp_contact.kernels.lengths import IMPULSE_TOLERANCE
 from warp_contact.step import residual, sweeps, warm_start
 from warp_contact.step.contact_graph import order_by_vertex
 from warp_contact.step.narrow_phase import append_edge_contacts
 
 SWEEPS = 48  # at most; few clusters of contacts last so long
-TOLERANCE = 1e-5  # of an edge: an approach in one step that is left to the closure
 NEGLIGIBLE = 0.1  # of the tolerance, at the shortest edge: a change that changes no other contact
 
 
@@ -87,9 +88,10 @@ def record(work: Work) -> None:
 
 def _solve_from_last(model: Model, state: State, work: Work) -> None:
     begin(model, state.x, work)
-    warm_start.recall_edges(work)
-    warm_start.recall_vertices(work)
-    apply(model, state.v, work)
+    if on("warm start"):
+        warm_start.recall_edges(work)
+        warm_start.recall_vertices(work)
+        apply(model, state.v, work)
     exchange(model, state.v, work)
 
 
@@ -113,6 +115,7 @@ def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
 
 def _sweep(model: Model, v: wp.array, work: Work, last: bool = False) -> None:
     c, s, limits = work.contacts, work.sweeps, _limits(work)
+    last = last or not on("extrapolation")
     launch_over(
         kernels.solve_contacts,
         work.capacity.contacts,
@@ -129,6 +132,6 @@ def _sweep(model: Model, v: wp.array, work: Work, last: bool = False) -> None:
 
 def _limits(work: Work) -> kernels.Limits:
     limits = kernels.Limits()
-    limits.tolerance, limits.sweeps = TOLERANCE, SWEEPS
-    limits.negligible = NEGLIGIBLE * TOLERANCE * work.mesh.edge
+    limits.tolerance, limits.sweeps = IMPULSE_TOLERANCE, SWEEPS
+    limits.negligible = NEGLIGIBLE * IMPULSE_TOLERANCE * work.mesh.edge
     return limits

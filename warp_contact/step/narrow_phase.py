@@ -11,6 +11,7 @@ import warp as wp
 
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.narrow_phase import edges, persistent, vertex_contact, vertices
 from warp_contact.step.broad_phase import track
@@ -47,6 +48,8 @@ def forget_edges(work: Work) -> None:
 def continue_edges(model: Model, x0: wp.array, work: Work) -> None:
     """Let the contacts of edges go on that pressed in the last step; this one begins at ``x0``."""
     none = partial(forget_edges, work)
+    if not on("persistent edges"):
+        return none()
     if_any(work.warm.n_edge, _continue_edges, model, x0, work, otherwise=none)
 
 
@@ -122,7 +125,10 @@ def _find_edges(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool
         n.n_new.zero_()
 
     n = work.narrow_phase
-    if_any(work.broad_phase.edges.n, find, otherwise=find_none)
+    if on("edges"):
+        if_any(work.broad_phase.edges.n, find, otherwise=find_none)
+    else:
+        find_none()
 
 
 def _continue_edges(model: Model, x0: wp.array, work: Work) -> None:

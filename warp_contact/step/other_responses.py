@@ -8,7 +8,7 @@ from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import penalty, predicted
 from warp_contact.step import broad_phase, impulse, residual, search
-from warp_contact.step.look import look, look_at_vertices
+from warp_contact.step.detection import detect, detect_vertices
 from warp_contact.step.motion import drift, predict
 from warp_contact.step.response import Penalty
 
@@ -18,7 +18,7 @@ def step_literal(model: Model, state: State, work: Work, stages: int, iterations
     predict(model, state, work, stages)
     broad_phase.refresh(model, state.x, work.x, work)
     wp.copy(state.x, work.x)
-    look_at_vertices(model, state.x, state.x, work)
+    detect_vertices(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, search.bisect, model, state.x, work, iterations)
     if_any(work.contacts.n, impulse.exchange, model, state.v, work)
@@ -28,7 +28,7 @@ def step_literal(model: Model, state: State, work: Work, stages: int, iterations
 def step_penalty(model: Model, state: State, work: Work, stages: int, response: Penalty) -> None:
     """Penalty forces: they belong to the positions at which they act."""
     broad_phase.refresh(model, state.x, state.x, work)
-    look(model, state.x, state.x, work)
+    detect(model, state.x, state.x, work)
     predict(model, state, work, stages)
     if_any(work.contacts.n, _push, model, state, work, response)
     impulse.record(work)
@@ -39,7 +39,7 @@ def step_predicted(model: Model, state: State, work: Work, stages: int) -> None:
     """Forces that close the gaps predicted for the end of the step; overlaps may last."""
     predict(model, state, work, stages)
     broad_phase.refresh(model, state.x, work.x, work)
-    look(model, state.x, work.x, work)
+    detect(model, state.x, work.x, work)
     if_any(work.contacts.n, _push_apart, model, state, work)
     impulse.record(work)
     drift(model, state, work, state.x)

@@ -7,10 +7,9 @@ import warp as wp
 from warp_contact.data.launch import launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.work import Work
+from warp_contact.kernels.lengths import SEARCH_BOUND
 from warp_contact.kernels.surface import region, search
 from warp_contact.step.forces import internal_forces
-
-BOUND = 0.02  # of an edge: the largest move in a step; more would invert a body started deep inside
 
 
 def begin(model: Model, x: wp.array, work: Work) -> None:
@@ -27,7 +26,7 @@ def begin(model: Model, x: wp.array, work: Work) -> None:
 
 
 def balance(model: Model, x: wp.array, work: Work, iterations: int) -> None:
-    """Move the region to where the pressures of both sides balance, by ``BOUND`` at most."""
+    """Move the region to where the pressures of both sides balance, by ``SEARCH_BOUND`` at most."""
     begin(model, x, work)
     s = work.surface
     wp.launch(
@@ -50,7 +49,7 @@ def balance(model: Model, x: wp.array, work: Work, iterations: int) -> None:
         _displace(model, x, work)
         _tractions(model, x, work, s.at_trial)
         _correct(model, work, s.at_trial, anew=False)
-    _displace(model, x, work, BOUND)
+    _displace(model, x, work, SEARCH_BOUND)
 
 
 def bisect(model: Model, x: wp.array, work: Work, iterations: int) -> None:

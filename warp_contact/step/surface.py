@@ -7,24 +7,27 @@ import warp as wp
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
+from warp_contact.data.switches import on
 from warp_contact.data.work import Work
+from warp_contact.kernels.lengths import OLD_OVERLAP
 from warp_contact.kernels.surface import closure
-from warp_contact.kernels.surface.residual import DEEP
 from warp_contact.step import residual, search, sweeps
 from warp_contact.step.contact_graph import add_parts
-from warp_contact.step.look import look, look_apart
-from warp_contact.step.search import BOUND
+from warp_contact.step.detection import detect, detect_apart
 
 
 def close_gaps(model: Model, state: State, work: Work) -> None:
     """Close what the impulses left, where bodies were apart when the step began."""
     residual.add_gaps(model, state.x, work)
-    residual.add_strays(model, state.x, work)
+    if on("strays"):
+        residual.add_strays(model, state.x, work)
     if_any(work.surface.any_open, _close_gaps, model, state, work)
 
 
 def resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
     """Search the surface between bodies that overlapped before the step, close what is left."""
+    if not on("search"):
+        return close_gaps(model, state, work)
     residual.add_gaps(model, state.x, work)
     if_any(work.surface.any_open, _resolve_overlaps, model, state, work, iterations)
 
@@ -35,7 +38,7 @@ def close(model: Model, state: State, work: Work) -> None:
     Contacts that overlapped when the step began are left out. ``state.v`` changes only by what
     keeps the angular momentum.
     """
-    _close(model, state, work, float(DEEP))
+    _close(model, state, work, OLD_OVERLAP if on("old planes") else math.inf)
 
 
 def close_all(model: Model, state: State, work: Work) -> None:
@@ -49,7 +52,8 @@ def _close_gaps(model: Model, state: State, work: Work) -> None:
     close(model, state, work)
     # Where vertices came to lie, their triangles may be others than before, and edges may cross
     # that the narrow phase could not see.
-    look_apart(model, state.x, state.x, work)
+    if on("second look"):
+        detect_apart(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, close_all, model, state, work)
 
@@ -57,28 +61,32 @@ def _close_gaps(model: Model, state: State, work: Work) -> None:
 def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
     if_any(work.surface.any_old, search.balance, model, state.x, work, iterations)
     close(model, state, work)
-    look(model, state.x, state.x, work)
+    if on("second look"):
+        detect(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, close, model, state, work)
 
 
 def _close(model: Model, state: State, work: Work, deep: float) -> None:
     """Leave contacts out that overlapped by more than ``deep``, of an edge, at the start."""
+    if not on("closure"):
+        return
     c, s = work.contacts, work.surface
     launch_over(
         closure.begin_closure,
         work.capacity.contacts,
-        inputs=[BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
+        inputs=[search.SEARCH_BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
         outputs=[s.slack, s.push],
     )
     sweeps.repeat(work, _sweep, model, state.x, work)
-    launch_over(
-        closure.torques,
-        work.capacity.contacts,
-        inputs=[c.n, c.record, c.constraint, s.push, state.v],
-        outputs=[c.part],
-    )
-    add_parts(model, state.v, work)
+    if on("closure torque"):
+        launch_over(
+            closure.torques,
+            work.capacity.contacts,
+            inputs=[c.n, c.record, c.constraint, s.push, state.v],
+            outputs=[c.part],
+        )
+        add_parts(model, state.v, work)
 
 
 def _sweep(model: Model, x: wp.array, work: Work) -> None:

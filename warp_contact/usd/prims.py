@@ -32,6 +32,11 @@ class Part:
     fixed: bool
     color: np.ndarray
 
+    @property
+    def n_vert(self) -> int:
+        """Number of its vertices."""
+        return self.verts[1] - self.verts[0]
+
 
 def linear(srgb: str) -> np.ndarray:
     """Linear colour of an sRGB hex code."""

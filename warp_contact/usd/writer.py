@@ -66,18 +66,19 @@ class UsdWriter:
         self.animate_tets = animate_tets and tets
         self.start = self.end = None
         self.parts = parts(sim.model)
-        counts = [end - first for first, end in (part.verts for part in self.parts)]
-        self.base = np.repeat([part.color for part in self.parts], counts, axis=0)
+        self.base = np.concatenate([np.tile(p.color, (p.n_vert, 1)) for p in self.parts])
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
-        self.grows = self.scale == 0.0
-        self.layer = self._declare()
+        self.grows, self.layer = self.scale == 0.0, self._declare()
         if resume:
             self._reopen()
-            self._remove(after=self.end)
-            return
+        else:
+            self._begin(topology(self.parts, sim, tets, view))
+
+    def _begin(self, prims: Sdf.Layer) -> None:
+        """Remove an earlier file at the same place, and write what does not change."""
         self.root.unlink(missing_ok=True)
         self._remove()
-        export(topology(self.parts, sim, tets, view), self.root.parent / "topology.usdc")
+        export(prims, self.root.parent / "topology.usdc")
         export(self.layer, self.root.parent / "manifest.usdc")
         self._write_root()
 
@@ -125,6 +126,7 @@ class UsdWriter:
         self.scale = last.customLayerData.get("pressureScale", self.scale)
         self.start, self.end = frame_numbers(stage)[0], frame
         self._write_root()
+        self._remove(after=frame)
 
     def _remove(self, after: int = -1) -> None:
         """Remove the frames after one, and what is unfinished or flattened."""

@@ -5,12 +5,11 @@ from functools import partial
 from unittest import mock
 
 import warp as wp
-from checks import surface as stage_4
 from stable import ratios, sweeps
 from stable.setup import attempt
-from verification import springs
+from verification import surface as stage_4
 from verification import weight as static
-from verification.setup import Ask, Pose
+from verification.setup import Ask
 
 import warp_contact as wc
 from warp_contact.kernels.impulse import impulse as impulse_kernels
@@ -20,7 +19,6 @@ INSERTED = "energy that it puts in [J]"
 RISE = "energy gained [of that stored]"
 GAINED = "energy gained [of that at the start]"
 PLACE = "place of the surface [% of the overlap]"
-PRESSED = "contact force [of the exact one]"
 SWEEPS = "sweeps of the impulses in a step"
 
 
@@ -28,7 +26,7 @@ def overlapping() -> dict[str, float]:
     """Stage 4, overlap of 10 %, 1:10."""
     rows = stage_4.place("", "balanced", wc.Corotated, 0.0, (3, 4), 10.0)
     figure = "surface of the lower block [% of overlap]"
-    return {PLACE: abs(next(row.value for row in rows if row.figure == figure))}
+    return {PLACE: abs(next(row.value for row in rows if row.name == figure))}
 
 
 def deep() -> dict[str, float]:
@@ -45,14 +43,6 @@ def inserted() -> dict[str, float]:
     """A block that starts 0.3 edges inside one 0.4 edges thick."""
     build = partial(sweeps.SWEEPS["depth"].build, 0.3, 0.4)
     return {RISE: max(attempt(build, most_steps=1500).gained, 0.0)}
-
-
-def columns() -> dict[str, float]:
-    """A1 columns, damped, at rest."""
-    pressed = springs.press(
-        "", springs.CASES["equal"], Ask(), 4, "structured", Pose(), springs.DAMPED
-    )
-    return {PRESSED: abs(next(pressed).error)}
 
 
 def dense() -> dict[str, float]:
@@ -76,15 +66,15 @@ def sheet() -> dict[str, float]:
     sweeps, steps, flag = (wp.zeros(1, dtype=int) for _ in range(3))
 
     def counting(function: Callable, number: wp.array) -> Callable:
-        def called(*args) -> None:
-            function(*args)
+        def called(*args, **kwargs) -> None:
+            function(*args, **kwargs)
             wp.launch(impulse_kernels.next_sweep, dim=1, inputs=[False], outputs=[flag, number])
 
         return called
 
     with (
         mock.patch.multiple(static, SETTLE=0.3, SAMPLE=0.1),
-        mock.patch.object(impulse, "next_sweep", counting(impulse.next_sweep, sweeps)),
+        mock.patch.object(impulse, "_sweep", counting(impulse._sweep, sweeps)),
         mock.patch.object(impulse, "record", counting(impulse.record, steps)),
     ):
         list(static.on_sheet("", Ask()))

@@ -3,11 +3,9 @@
 from functools import partial
 
 import numpy as np
-from checks import collision
 from stable import limits, tilts
 from stable.setup import attempt
-from verification import collision as free
-from verification.setup import Ask
+from verification import collision
 
 import warp_contact as wc
 
@@ -25,8 +23,9 @@ def tilted() -> dict[str, float]:
 
 def oblique() -> dict[str, float]:
     """Oblique collision with friction."""
-    found = {f.name: f.error for f in free.collide(Ask(), (3, 5), "oblique", 1.0)}
-    return {SPIN: found["change of ang. momentum [of sum m |x| |v|]"]}
+    scene = collision.thrown((3, 5), "oblique", 1.0)
+    found = collision.collide(scene, steps=collision.STEPS)
+    return {SPIN: found["angular momentum change [of sum m |x| |v|]"]}
 
 
 def fine() -> dict[str, float]:

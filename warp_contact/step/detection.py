@@ -8,7 +8,7 @@ from warp_contact.data.work import Work
 from warp_contact.step import impulse, narrow_phase
 
 
-def look(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+def detect(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """Contacts of vertices and edges at ``x``, in a step from ``x0``, and what holds them."""
     narrow_phase.find_inner_vertices(model, x0, x, work)
     narrow_phase.forget_edges(work)
@@ -16,7 +16,7 @@ def look(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     _hold(model, x0, work)
 
 
-def look_apart(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+def detect_apart(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """The same where bodies were apart when the step began."""
     narrow_phase.find_entered_vertices(model, x0, x, work)
     narrow_phase.forget_edges(work)
@@ -24,7 +24,7 @@ def look_apart(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     _hold(model, x0, work)
 
 
-def look_at_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+def detect_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """Contacts of vertices alone, as in the paper."""
     narrow_phase.find_inner_vertices(model, x0, x, work)
     if_any(work.contacts.n, impulse.begin, model, x0, work)

@@ -1,0 +1,130 @@
+"""broad_phase.py: which bodies are near, and for how long what was found holds."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warp_contact import NeoHookean, Scene, Simulation, box
+from warp_contact.step import broad_phase
+
+RUBBER = NeoHookean(1e5, 0.3, 1000.0)
+
+
+def test_bodies_of_different_worlds_are_never_near(stages, jittered):
+    scene = Scene()
+    mesh = jittered(1.0, 2)
+    for k, world in enumerate((0, 1, 1, 2)):
+        scene.add_body(mesh, RUBBER, (0.1 * k, 0.0, 0.0), world=world)
+    model, state, work = stages(scene)
+    broad_phase.refresh(model, state.x, state.x, work)
+    near = work.broad_phase.near
+    np.testing.assert_array_equal(near.n_near.numpy(), [0, 1, 1, 0])
+    assert near.near.numpy()[1, 0] == 2 and near.near.numpy()[2, 0] == 1
+
+
+def test_near_bodies_have_boxes_that_meet_and_none_that_touches_is_missed(
+    rng, stages, turned, brute_force
+):
+    scene = Scene()
+    for _ in range(19):
+        scene.add_body(box(0.5, 1), RUBBER, rng.uniform(-1.0, 1.0, 3), turned())
+    scene.add_body(box(0.01, 1), RUBBER, scene.bodies[0].x.mean(axis=0))  # enclosed
+    model, state, work = stages(scene)
+    broad_phase.refresh(model, state.x, state.x, work)
+    x = state.x.numpy().reshape(20, 8, 3)
+    skin = work.broad_phase.skin.numpy()[:, None] + 1e-6  # rounding
+    lo, hi = x.min(axis=1) - skin, x.max(axis=1) + skin
+    meet = ((lo[:, None] <= hi) & (lo <= hi[:, None])).all(axis=2) & ~np.eye(20, dtype=bool)
+    near = np.zeros((20, 20), dtype=bool)
+    for body, n in enumerate(work.broad_phase.near.n_near.numpy()):
+        listed = work.broad_phase.near.near.numpy()[body, :n]
+        assert (np.diff(listed) > 0).all()
+        near[body, listed] = True
+    assert not (near & ~meet).any() and (near == near.T).all()
+    sure, _ = brute_force(scene, state.x.numpy().astype(float))
+    assert all(near[i // 8, body] for i, body in sure) and near[0, 19]
+
+
+def test_a_fast_body_does_not_reach_for_others_with_its_own_skin(stages):
+    """Where it has the longest skin only because nothing is near, it lasts without pairs."""
+    found = []
+    for away in (0.06, 1.0):
+        scene, dt, v = Scene(), 1e-3, np.array([2.0, 0.0, 0.0])
+        scene.add_body(box(0.1, 2), RUBBER)
+        scene.add_body(box(0.1, 2), RUBBER, (0.1 + away, 0.0, 0.0), velocity=v)
+        model, state, work = stages(scene, dt=dt)
+        x1 = wp.array(state.x.numpy() + dt * state.v.numpy(), dtype=wp.vec3)
+        broad_phase.refresh(model, state.x, x1, work)
+        b = work.broad_phase
+        free = b.free.numpy()
+        pairs = b.edges.n.numpy()[0] + b.verts.n.numpy()[0]
+        found.append((free[1] / (dt * v[0]), pairs))
+    (short, none), (long, none_either) = found
+    # A few motions when the other one, at rest, is within 32 of them.
+    assert none == none_either == 0
+    assert 1.0 <= short < 8.0
+    assert long == pytest.approx(32.0, rel=1e-3)
+
+
+def test_nothing_is_looked_for_where_no_body_is_near(stages, monkeypatch):
+    looked = []
+    monkeypatch.setattr(
+        broad_phase, "_find_tets", lambda *a, f=broad_phase._find_tets: looked.append(f(*a))
+    )
+    for away, plane in ((0.101, False), (1.0, False), (1.0, True)):
+        scene = Scene()
+        if plane:
+            scene.add_plane((0.0, 0.0, 1.0), -0.05)
+        scene.add_body(box(0.1, 2), RUBBER)
+        scene.add_body(box(0.1, 2), RUBBER, (away, 0.0, 0.0))
+        model, state, work = stages(scene)
+        looked.clear()
+        broad_phase.refresh(model, state.x, state.x, work)
+        b = work.broad_phase
+        near = away < 0.5
+        assert len(looked) == (1 if near or plane else 0)
+        assert (b.edges.n.numpy()[0] > 0) == near and (b.verts.n.numpy()[0] > 0) == (near or plane)
+        assert b.any_pair.numpy()[0] == (1 if near or plane else 0)
+        # They part: what was listed is forgotten.
+        x = state.x.numpy()
+        x[model.vert_body.numpy() == 1] += (3.0, 0.0, 1.0)
+        state.x.assign(x)
+        broad_phase.refresh(model, state.x, state.x, work)
+        for pairs in (b.edges,) if plane else (b.edges, b.verts):
+            assert pairs.n.numpy()[0] == 0
+            assert not pairs.list.start.numpy().any() and not pairs.item_start.numpy().any()
+        assert plane or b.any_pair.numpy()[0] == 0
+
+
+def test_what_has_become_fast_is_looked_at_anew(stages):
+    scene, dt, v = Scene(), 1e-3, np.array([2.0, 0.0, 0.0])
+    scene.add_body(box(0.1, 2), RUBBER, velocity=v)
+    scene.add_body(box(0.1, 2), RUBBER, (1.0, 0.0, 0.0))
+    model, state, work = stages(scene, dt=dt)
+    x = state.x.numpy()
+    b, own = work.broad_phase, (model.vert_body.numpy() == 0)[:, None]
+    broad_phase.refresh(model, state.x, wp.array(x + dt * v * own, dtype=wp.vec3), work)
+    assert b.free.numpy()[0] > 30.0 * dt * v[0]
+    for steps, anew in ((1.5, False), (3.0, True)):  # far less than is free
+        x = x + 1e-4 * own
+        ahead = wp.array(x + steps * dt * v * own, dtype=wp.vec3)
+        broad_phase.refresh(model, wp.array(x, dtype=wp.vec3), ahead, work)
+        assert np.array_equal(b.x.numpy(), x.astype(np.float32)) == anew
+
+
+def test_pairs_kept_for_many_steps_give_the_same_bits_as_new_ones(pile, monkeypatch):
+    kept, renewed = Simulation(pile), Simulation(pile)
+    launched = broad_phase.refresh
+    rebuilt = 0
+    for _ in range(20):
+        kept.step_frame()
+        # Where nothing is free they are stale in every step.
+        with monkeypatch.context() as m:
+            m.setattr(
+                broad_phase, "refresh", lambda *a: (a[3].broad_phase.free.zero_(), launched(*a))
+            )
+            renewed.step_frame()
+        rebuilt += int(renewed.measure().n_contacts > 0)
+        np.testing.assert_array_equal(kept.positions(), renewed.positions())
+        np.testing.assert_array_equal(kept.velocities(), renewed.velocities())
+    assert rebuilt > 5

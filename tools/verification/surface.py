@@ -1,0 +1,125 @@
+"""Stage 4 alone: where the contact surface of two overlapping blocks comes to lie.
+
+Nothing moves but the surfaces, so each block is a layer of springs k = E / c, c the height of
+its cells, and the surface belongs at the part a = k_other / (k_own + k_other) of the overlap from
+where the block's own surface was.
+"""
+
+from itertools import product
+
+import numpy as np
+from measure.figure import Figure, Figures, zero
+
+import warp_contact as wc
+from verification.setup import Ask, facing, height
+from warp_contact.data.overflow import Capacity
+from warp_contact.data.work import Work, allocate_work
+from warp_contact.step import broad_phase, residual, search, surface
+from warp_contact.step.detection import detect, detect_vertices
+from warp_contact.step.loop import step_of
+
+EDGE = 0.1  # of a block [m]
+YOUNG, DENSITY = 5e4, 1000.0  # of the lower block [Pa], [kg/m^3]
+OVERLAP = 0.01  # [m]
+DT = 1e-4  # [s]
+CALLS = 200  # of stage 4, at most
+ROOM = Capacity(contacts=4096, verts=8192, tets=65536, edges=8192, tris=65536, near=65536)
+CELLS = (4, 4), (3, 4)
+RATIOS = 1.0, 10.0
+MATERIALS = {
+    "corotated nu 0": (wc.Corotated, 0.0),
+    "corotated nu 0.3": (wc.Corotated, 0.3),
+    "neo-Hookean nu 0.3": (wc.NeoHookean, 0.3),
+}
+SEARCHES = "balanced", "literal"
+
+
+def run(ask: Ask) -> Figures:
+    """Every combination, whatever the response; the quick run takes one material."""
+    materials = list(MATERIALS)[: 1 if ask.quick else None]
+    for way, name, cells, ratio in product(SEARCHES, materials, CELLS, RATIOS):
+        case = f"surface {way} {cells[0]}:{cells[1]} 1:{ratio:g} {name}"
+        yield from place(case, way, *MATERIALS[name], cells, ratio)
+
+
+def prepare(way: str, *block) -> tuple[wc.Simulation, Work]:
+    """Two blocks that overlap by ``OVERLAP`` in z, the lower one's top at z = ``EDGE``."""
+    model, poisson, cells, ratio = block
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+    lower = wc.box(EDGE, cells[0])
+    upper = wc.box(EDGE, cells[1], mirrored=cells[0] % 2 == 1)
+    scene.add_body(lower, model(YOUNG, poisson, DENSITY), (0, 0, 0.5 * EDGE))
+    high = (0.0, 0.0, 1.5 * EDGE - OVERLAP)
+    scene.add_body(upper, model(ratio * YOUNG, poisson, DENSITY), high)
+    sim = wc.Simulation(scene, wc.ContactSurface(way))
+    work = allocate_work(sim.model, sim.state, ROOM)
+    work.dt.fill_(DT)
+    return sim, work
+
+
+def place(
+    case: str, way: str, model, poisson: float, cells: tuple[int, int], ratio: float
+) -> Figures:
+    """Figures of one combination; those of the literal search are shown only."""
+    block = model, poisson, cells, ratio
+    sim, work = prepare(way, *block)
+    calls = settle(sim, work)
+    if work.overflow.all.numpy().any():
+        raise RuntimeError(f"capacities {work.overflow.all.numpy()} needed")
+
+    wanted = way == "balanced"
+    stiff = ratio * cells[1] / cells[0]  # k of the upper block over that of the lower one
+    expected = EDGE - OVERLAP * stiff / (1.0 + stiff)
+    most = ((1.0 if cells[0] == cells[1] else 5.0),) if wanted else ()
+    x = [sim.positions(body) for body in sim.scene.bodies]
+    tris = [facing(b.x, b.mesh.surface, (1.0, -1.0)[b.index]) for b in sim.scene.bodies]
+    for name, at, own in zip(("lower", "upper"), x, tris, strict=True):
+        z = at[np.unique(own), 2].astype(float)
+        off = 100.0 * (z.mean() - expected) / OVERLAP
+        yield zero(case, f"surface of the {name} block [% of overlap]", off, most)
+    scatter = 100.0 * float(np.std(x[1][np.unique(tris[1]), 2])) / OVERLAP
+    yield Figure(case, "its scatter, standard deviation [% of overlap]", scatter)
+    gaps = gap(x[0], tris[0], x[1], tris[1])
+    for figure, value in (
+        ("largest gap", max(gaps.max(), 0.0)),
+        ("largest overlap, vertical", max(-gaps.min(), 0.0)),
+        ("deepest overlap, as measured", sim.measure().overlap),
+    ):
+        limits = (1.0,) if wanted else ()
+        yield zero(case, f"{figure} [% of overlap]", 100.0 * value / OVERLAP, limits)
+    yield Figure(case, "calls of stage 4 until nothing is left", calls)
+    figure = "largest speed after one step [of overlap / dt]"
+    speed = first_speed(*prepare(way, *block))
+    yield zero(case, figure, speed / (OVERLAP / DT), (1e-6,) if wanted else ())
+
+
+def settle(sim: wc.Simulation, work: Work) -> int:
+    """Let stage 4 move the surfaces until nothing is left; return how often it was called."""
+    model, state, tries = sim.model, sim.state, sim.response.iterations
+    balanced = sim.response.search == "balanced"
+    for call in range(CALLS):
+        broad_phase.refresh(model, state.x, state.x, work)
+        (detect if balanced else detect_vertices)(model, state.x, state.x, work)
+        residual.find_gaps(model, state.x, work)
+        if not work.surface.any_open.numpy()[0]:
+            return call
+        if balanced:
+            surface.resolve_overlaps(model, state, work, tries)
+        else:
+            search.bisect(model, state.x, work, tries)
+    return CALLS
+
+
+def first_speed(sim: wc.Simulation, work: Work) -> float:
+    """Largest speed [m/s] after one full step from rest; the rest shapes carry no force."""
+    step_of(sim.response, overlapping=True)(sim.model, sim.state, work, 0)
+    return float(np.linalg.norm(sim.velocities(), axis=1).max())
+
+
+def gap(xl: np.ndarray, under: np.ndarray, xu: np.ndarray, above: np.ndarray) -> np.ndarray:
+    """Vertical gap [m] at the vertices of both surfaces; those beside the other are left out."""
+    top, bottom = xl[np.unique(under)], xu[np.unique(above)]
+    at_top = height(top, xu, above) - top[:, 2]
+    at_bottom = bottom[:, 2] - height(bottom, xl, under)
+    gaps = np.concatenate([at_top, at_bottom])
+    return gaps[np.isfinite(gaps)]

@@ -212,7 +212,7 @@ class Simulation:
             self.state.v.assign(values["v"])
             self._stepper.restore(values)
             self._meter = Meter(self.model)
-            self._meter.tunnelling.remember(checkpoint.part(values, "meter"))
+            self._meter.tunnelling.remember(checkpoint.group(values, "meter"))
         self.frame = int(values["frame"])
 
     def _fingerprint(self) -> str:

@@ -6,7 +6,7 @@ Threads append the pairs that they find to a list in any order; pairs.py sorts i
 import warp as wp
 
 from warp_contact.kernels.broad_phase.bounds import next_in
-from warp_contact.kernels.broad_phase.near import MANY, Near, is_near, part, reaches
+from warp_contact.kernels.broad_phase.near import MANY, Near, is_near, piece, reaches
 from warp_contact.kernels.broad_phase.pairs import append
 from warp_contact.kernels.geometry import boxes_meet
 from warp_contact.kernels.mesh import Mesh
@@ -83,10 +83,10 @@ def visit_edges(
         return
     p = x[mesh.edges[e][0]]
     q = x[mesh.edges[e][1]]
-    own = part(p, p, q, q, skin[m])
+    own = piece(p, p, q, q, skin[m])
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
-            reach = skin[m] + skin[of.near[m, k]]
+            reach = skin[m] + skin[of.other[m, k]]
             if reaches(own, of.slab[m, k]):
                 other = of.part[m, k]
                 if boxes_meet(own.lo, own.hi, other.tri_lower, other.tri_upper):

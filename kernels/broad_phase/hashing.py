@@ -10,7 +10,7 @@ A half-space counts as a body with one tet.
 
 import warp as wp
 
-from warp_contact.kernels.broad_phase.near import MANY, Near, any_near, is_near, part, reaches
+from warp_contact.kernels.broad_phase.near import MANY, Near, any_near, is_near, piece, reaches
 from warp_contact.kernels.broad_phase.pairs import append
 from warp_contact.kernels.geometry import boxes_meet, in_box
 from warp_contact.kernels.mesh import Mesh
@@ -53,7 +53,7 @@ def count_cells(
     i = wp.tid()
     m = vert_body[i]
     key[i] = -1
-    if any_near(m, part(x[i], x[i], x[i], x[i], skin[m]), of):
+    if any_near(m, piece(x[i], x[i], x[i], x[i], skin[m]), of):
         h = hash_of(cell_of(x[i], size), m, count.shape[0] - 1)
         key[i] = h
         wp.atomic_add(count, h, 1)
@@ -166,13 +166,13 @@ def visit_tets(
     if of.n_near[m] == 0:
         return
     t = mesh.tets[q]
-    own = part(x[t[0]], x[t[1]], x[t[2]], x[t[3]], skin[m])
+    own = piece(x[t[0]], x[t[1]], x[t[2]], x[t[3]], skin[m])
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
             if reaches(own, of.slab[m, k]):
                 other = of.part[m, k]
                 if boxes_meet(own.lo, own.hi, other.vert_lower, other.vert_upper):
-                    body = of.near[m, k]
+                    body = of.other[m, k]
                     grow = wp.vec3(skin[body], skin[body], skin[body])
                     lo = wp.max(own.lo - grow, other.vert_lower)
                     hi = wp.min(own.hi + grow, other.vert_upper)

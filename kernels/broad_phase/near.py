@@ -59,7 +59,7 @@ def near_bodies(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     n_near: wp.array[int],  # (n_body,), MANY + 1 for a body without a list
-    near: wp.array2d[int],  # (n_body, MANY), ascending
+    listed: wp.array2d[int],  # (n_body, MANY) near bodies, ascending
     slab: wp.array2d[wp.vec4],  # (n_body, MANY) axis towards the near body, its begin along it [m]
     end: wp.array2d[float],  # (n_body, MANY) where body m ends along the axis [m]
     # out, added to
@@ -83,12 +83,12 @@ def near_bodies(
                 if last >= begin:
                     if count < MANY:
                         k = int(count)
-                        while k > 0 and near[m, wp.max(k - 1, 0)] > other:
-                            near[m, k] = near[m, k - 1]
+                        while k > 0 and listed[m, wp.max(k - 1, 0)] > other:
+                            listed[m, k] = listed[m, k - 1]
                             slab[m, k] = slab[m, k - 1]
                             end[m, k] = end[m, k - 1]
                             k -= 1
-                        near[m, k] = other
+                        listed[m, k] = other
                         slab[m, k] = wp.vec4(axis[0], axis[1], axis[2], begin)
                         end[m, k] = last
                     count += 1
@@ -98,8 +98,8 @@ def near_bodies(
 
 
 @wp.struct
-class Part:
-    """A part of a body: its corners, its skin, and the box around both."""
+class Piece:
+    """A piece of a body: its corners, its skin, and the box around both."""
 
     a: wp.vec3
     b: wp.vec3
@@ -111,8 +111,8 @@ class Part:
 
 
 @wp.func
-def part(a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3, skin: float) -> Part:
-    out = Part()
+def piece(a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3, skin: float) -> Piece:
+    out = Piece()
     out.a = a
     out.b = b
     out.c = c
@@ -124,7 +124,7 @@ def part(a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3, skin: float) -> Part:
 
 
 @wp.func
-def reaches(p: Part, slab: wp.vec4) -> bool:
+def reaches(p: Piece, slab: wp.vec4) -> bool:
     """Whether a corner is in the slab of a near body."""
     n = wp.vec3(slab[0], slab[1], slab[2])
     s = wp.max(wp.max(wp.dot(n, p.a), wp.dot(n, p.b)), wp.max(wp.dot(n, p.c), wp.dot(n, p.d)))
@@ -151,7 +151,7 @@ class Near:
     lower: wp.array[wp.vec3]  # (n_body,) boxes of the bodies [m]
     upper: wp.array[wp.vec3]  # (n_body,)
     n_near: wp.array[int]  # (n_body,) MANY + 1 for a body without a list
-    near: wp.array2d[int]  # ascending
+    other: wp.array2d[int]  # these bodies, ascending
     slab: wp.array2d[wp.vec4]  # axis towards the near body, its begin along it [m]
     end: wp.array2d[float]  # where body m ends along it [m]
     part: wp.array2d[NearPart]  # of the near body, as far as body m reaches
@@ -174,7 +174,7 @@ def near_parts(
     m, k = wp.tid()
     if of.n_near[m] > MANY or k >= of.n_near[m]:
         return
-    body = of.near[m, k]
+    body = of.other[m, k]
     s = of.slab[m, k]
     back = wp.vec4(-s[0], -s[1], -s[2], -of.end[m, k])
     own = skin[body]
@@ -186,7 +186,7 @@ def near_parts(
         hi = of.upper[body]
     else:
         for i in range(mesh.body_vert[body], mesh.body_vert[body + 1]):
-            if reaches(part(x[i], x[i], x[i], x[i], own), back):
+            if reaches(piece(x[i], x[i], x[i], x[i], own), back):
                 lo = wp.min(lo, x[i] - grow)
                 hi = wp.max(hi, x[i] + grow)
     out = NearPart()
@@ -202,7 +202,7 @@ def near_parts(
         query = wp.bvh_query_aabb(mesh.bvh, of.lower[m], of.upper[m], root)
         while wp.bvh_query_next(query, t):
             c = x[mesh.tris[t][2]]
-            p = part(x[mesh.tris[t][0]], x[mesh.tris[t][1]], c, c, own)
+            p = piece(x[mesh.tris[t][0]], x[mesh.tris[t][1]], c, c, own)
             if reaches(p, back):
                 if fill == 1:
                     near_tri[first + n] = t
@@ -236,19 +236,19 @@ def fits(
 
 
 @wp.func
-def is_near(m: int, body: int, p: Part, of: Near) -> bool:
-    """Whether a part of body m, which has no list, may touch another body."""
+def is_near(m: int, body: int, p: Piece, of: Near) -> bool:
+    """Whether a piece of body m, which has no list, may touch another body."""
     if body == m or of.n_near[body] == 0:
         return False
     return boxes_meet(p.lo, p.hi, of.lower[body], of.upper[body])
 
 
 @wp.func
-def any_near(m: int, p: Part, of: Near) -> bool:
-    """Whether a part of body m may touch another body."""
+def any_near(m: int, p: Piece, of: Near) -> bool:
+    """Whether a piece of body m may touch another body."""
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
-            body = of.near[m, k]
+            body = of.other[m, k]
             if reaches(p, of.slab[m, k]) and boxes_meet(p.lo, p.hi, of.lower[body], of.upper[body]):
                 return True
         return False

@@ -163,7 +163,7 @@ def choose_skins(
     other = int(0)
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
-            other = of.near[m, k]
+            other = of.other[m, k]
             if meet_within(m, other, looks, edge, motion, of):
                 push = wp.max(push, motion[other])
     else:
@@ -184,8 +184,8 @@ def choose_skins(
 def go_on(
     # in, out
     motion: wp.array[float],  # (n_body,) [m] 0 on return
-    pace: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
-    way: wp.array[float],  # (n_body + n_plane,) [m]
+    recent: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
+    travelled: wp.array[float],  # (n_body + n_plane,) [m]
     # out
     n_new: wp.array[int],  # (1,) 0: the new contacts of edges are counted from here on
 ):
@@ -193,6 +193,6 @@ def go_on(
     m = wp.tid()
     if m == 0:
         n_new[0] = 0
-    way[m] = way[m] + motion[m]
-    pace[m] = wp.max(motion[m], FADING * pace[m])
+    travelled[m] = travelled[m] + motion[m]
+    recent[m] = wp.max(motion[m], FADING * recent[m])
     motion[m] = 0.0

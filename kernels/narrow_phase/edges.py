@@ -59,7 +59,7 @@ def find_crossings(
     mesh: Mesh,
     pairs: PairList,  # edges and bodies
     skin: wp.array[float],  # (n_body,) [m]
-    pace: wp.array[float],  # (n_body,) [m] largest of the last motions
+    recent: wp.array[float],  # (n_body,) [m] largest of the last motions
     travelled: wp.array[float],  # (n_body + n_plane,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -95,7 +95,7 @@ def find_crossings(
         if spent < clear_until[c]:
             continue
         among = pairs.items[c]
-        enough = wp.min(AHEAD * (pace[own] + pace[body]), reach)
+        enough = wp.min(AHEAD * (recent[own] + recent[body]), reach)
         clear = clearance(among, enough, pairs.item, mesh.tris, x, x[e[0]], x[e[1]])
         clear_until[c] = spent + CAREFUL * clear
         if clear > 0.0:

@@ -42,7 +42,7 @@ def test_a_body_near_very_many_others_misses_none(rng, stages, jittered, turned,
     model, state, work = stages(scene)
     pairs = set(found(model, state, work))
     near = work.broad_phase.near
-    assert near.n_near.numpy()[0] > near.near.shape[1]
+    assert near.n_near.numpy()[0] > near.other.shape[1]
     sure, doubtful = brute_force(scene, state.x.numpy().astype(float))
     assert sure and sure <= pairs <= sure | doubtful
     narrow_phase.forget_edges(work)

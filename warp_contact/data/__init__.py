@@ -1,1 +1,1 @@
-"""The arrays of a simulation: what stays, evolves or is shared by stages, which import them."""
+"""The arrays of a simulation: the constant ones, the state, and those that stages share."""

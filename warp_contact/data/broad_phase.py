@@ -1,4 +1,4 @@
-"""Which pairs may touch, for as many steps as that holds."""
+"""The pairs of the broad phase, which hold for many steps."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from warp_contact.data.overflow import Capacity
 from warp_contact.kernels.broad_phase.near import MANY, Near, NearPart
 from warp_contact.kernels.broad_phase.pairs import PairList
 
-LEAF = 8  # triangles in a leaf: to ask for the few near a vertex takes a quarter less than with 1
+LEAF = 8  # triangles in a leaf: a query for the few near a vertex takes a quarter less than with 1
 
 
 @dataclass
@@ -20,7 +20,7 @@ class Pairs:
     Attributes:
         list: the pairs and their items
         item_start: first item of each owner, shape (n_owner + 1,)
-        clear_until: way travelled by owner and body up to which they do not meet [m],
+        clear_until: distance travelled by both bodies, before which they do not meet [m],
             shape (capacity,)
     """
 
@@ -36,13 +36,13 @@ class Pairs:
 
 @dataclass
 class BroadPhase:
-    """What may touch as long as no vertex is further than the skin from where it was then.
+    """What may touch as long as no vertex is further than the skin of its body from ``x``.
 
     Attributes:
         x: positions at which the pairs were found [m], shape (n_vert,)
-        free: how far from them a prediction may be [m], shape (n_body,)
-        skin: how far from them the pairs hold [m], shape (n_body,)
-        motion: largest motion of each body since the last look [m], shape (n_body,)
+        free: how far from ``x`` a prediction may be [m], shape (n_body,)
+        skin: how far from ``x`` the pairs hold [m], shape (n_body,)
+        motion: largest motion of each body since the last detection pass [m], shape (n_body,)
         recent: largest of the last motions, older ones count less [m], shape (n_body,)
         fastest: largest of the motions when the pairs were found [m], shape (1,)
         total: their sum, in counts of skins.py, shape (1,)
@@ -50,7 +50,7 @@ class BroadPhase:
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
         any_pair: whether there are any, shape (1,)
-        last: positions of the last look [m], shape (n_vert,)
+        last: positions of the last detection pass [m], shape (n_vert,)
         travelled: sum of the motions since the pairs were found [m], shape (n_body + n_plane,)
         n_found: length of the list that is being filled, shape (1,)
         vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
@@ -95,7 +95,7 @@ class BroadPhase:
 
 
 def allocate(model: Model, x: wp.array[wp.vec3], capacity: Capacity) -> BroadPhase:
-    """Nothing was found yet; the Bvhs are built around ``x``."""
+    """Allocate without any pair; the Bvhs are built around ``x``."""
     n, n_body = model.n_vert, model.n_body
     trees = _trees(model, x)
     return BroadPhase(
@@ -153,7 +153,7 @@ def _near(
     near = Near()
     near.bodies, near.world = bodies.id, model.body_world
     near.lower, near.upper = lower, upper
-    near.n_near, near.near = n_near, wp.zeros(shape, dtype=int)
+    near.n_near, near.other = n_near, wp.zeros(shape, dtype=int)
     near.slab, near.end = wp.zeros(shape, dtype=wp.vec4), wp.zeros(shape, dtype=float)
     near.part = wp.zeros(shape, dtype=NearPart)
     return near

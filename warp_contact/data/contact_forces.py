@@ -7,7 +7,7 @@ import warp as wp
 
 @dataclass
 class ContactForces:
-    """Added up from the first step of the frame on.
+    """Impulses summed since the first step of the frame.
 
     Attributes:
         unit: momentum of one count in ``pair_total`` [N s]
@@ -23,7 +23,7 @@ class ContactForces:
 
 
 def allocate(n_vert: int, n_pair: int, unit: float) -> ContactForces:
-    """There was no impulse yet."""
+    """Allocate without any impulse."""
     return ContactForces(
         unit=unit,
         received=wp.zeros(n_vert, dtype=wp.vec3),

@@ -1,4 +1,4 @@
-"""The contacts of a step, rebuilt in every step: what stages of the step share."""
+"""The contacts of a step, rebuilt in every step and shared by its stages."""
 
 from dataclasses import dataclass
 
@@ -17,10 +17,10 @@ class Contacts:
 
     Attributes:
         n: number of contacts, shape (1,)
-        n_vertex: number of those of vertices, as many as vertices inside other bodies, shape (1,)
+        n_vertex: number of those of vertices: one for each penetration, shape (1,)
         record: vertices, weights, direction and bodies of each, shape (capacity,)
         graph: the contacts of each vertex
-        constraint: what holds each of them in this step, shape (capacity,)
+        constraint: the constants of each in this step, shape (capacity,)
         impulse: of the step, shape (capacity,)
         part: what a sweep adds at each vertex of each contact [N s], shape (5 capacity,)
     """
@@ -35,7 +35,7 @@ class Contacts:
 
 
 def allocate(n_vert: int, capacity: int, n_vertex: wp.array[int]) -> Contacts:
-    """Room for contacts; ``n_vertex`` is counted by the narrow phase."""
+    """Allocate without any contact; the narrow phase counts ``n_vertex``."""
     graph = ContactGraph()
     graph.start = wp.zeros(n_vert + 1, dtype=int)
     graph.entry = wp.zeros(5 * capacity, dtype=int)

@@ -1,9 +1,9 @@
-"""Launches over lists of which a part is in use, and stages that run on a condition.
+"""Launches over lists that are in use in part, and stages that run on a condition.
 
-On the CPU threads run one after another, and each loads all arguments of its kernel first, which
-costs more than an unused entry of a list is worth. Kernels over lists therefore take the number of
-their threads, and each thread takes every entry that lies that many behind the one before: on the
-CPU one thread has them all, on a GPU each has its own.
+On the CPU threads run one after another. Each loads all arguments of its kernel first, which costs
+more than an unused entry of a list. Kernels over lists therefore take the number of threads, and
+thread t handles the entries t, t + threads, t + 2 threads and so on. On the CPU one thread handles
+all of them, on a GPU each handles one.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What the narrow phase finds on its way to the contacts of a step."""
+"""Intermediate results of the narrow phase."""
 
 from dataclasses import dataclass
 
@@ -11,21 +11,21 @@ from warp_contact.kernels.narrow_phase.vertices import Penetration
 
 @dataclass
 class NarrowPhase:
-    """Vertices inside bodies, and the contacts of edges by the place at which they are kept.
+    """Penetrations, and the contacts of edges by their places.
 
     Attributes:
         inside_at: penetrations before each pair of a vertex and a body, shape (pairs + 1,)
         n_inside: their number: the last entry, shape (1,)
         penetration: vertices inside bodies, shape (contacts,)
         layer: layer of the propagation of depths, shape (1,)
-        pending: whether it goes on, shape (1,)
+        pending: whether another layer is needed, shape (1,)
         crossing_at: contacts before each pair of an edge and a body, shape (pairs + 1,)
         n_crossing: their number: the last entry, shape (1,)
         found: contacts of edges in any order, shape (contacts,)
         n_place: places taken in ``found``, some of them no longer in use, shape (1,)
-        place: that of the first contact of each pair, -1 for none, shape (pairs,)
+        place: place of the first contact of each pair, -1 for none, shape (pairs,)
         source: place of each contact of an edge, shape (contacts,)
-        n_new: contacts of edges that the last look has added, shape (1,)
+        n_new: contacts of edges that the last detection pass has added, shape (1,)
         none: zero, shape (1,)
     """
 
@@ -45,7 +45,7 @@ class NarrowPhase:
 
 
 def allocate(capacity: Capacity) -> NarrowPhase:
-    """Nothing was found yet."""
+    """Allocate without any contact."""
     inside_at = wp.zeros(capacity.verts + 1, dtype=int)
     crossing_at = wp.zeros(capacity.edges + 1, dtype=int)
     return NarrowPhase(

@@ -1,4 +1,4 @@
-"""How much room a step has in its lists, and what did not fit."""
+"""The capacities of a step's lists, and what did not fit."""
 
 from dataclasses import dataclass
 
@@ -7,15 +7,15 @@ import warp as wp
 
 @dataclass(frozen=True)
 class Capacity:
-    """How much a step has room for.
+    """The capacities of a step's lists.
 
     Attributes:
-        contacts: contacts, and vertices inside other bodies
+        contacts: contacts, and penetrations
         pairs: pairs of bodies with a contact force
-        verts: pairs of a vertex and a body that may come to hold it
-        tets: the tets in question
-        edges: pairs of an edge and a body that it may come to cross
-        tris: the triangles in question
+        verts: pairs of a vertex and a body that it may enter
+        tets: the tets of these pairs
+        edges: pairs of an edge and a body that it may cross
+        tris: the triangles of these pairs
         near: triangles of near bodies that reach into the slab of a body
     """
 
@@ -30,10 +30,10 @@ class Capacity:
 
 @dataclass
 class Overflow:
-    """Capacities that would have been enough, 0 where they were: each of shape (1,).
+    """Capacities that would have been enough, 0 where the present ones are: each of shape (1,).
 
-    What does not fit is counted here and never written. Of pairs of bodies it is one more than
-    there is room for.
+    What does not fit is counted here and never written. For pairs of bodies it is one more than
+    the capacity.
 
     Attributes:
         all: the same in one array, in the order of ``Capacity``, shape (7,)

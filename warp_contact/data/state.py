@@ -1,4 +1,4 @@
-"""What a step advances, and what of it moves."""
+"""The state that a step advances, and which part of it is awake."""
 
 from dataclasses import dataclass
 
@@ -20,11 +20,11 @@ class State:
 
 @dataclass
 class Awake:
-    """What moves: all, unless bodies at rest may sleep.
+    """What moves: everything, unless bodies at rest may sleep.
 
     Attributes:
-        bodies: 1, asleep 0, shape (n_body,)
-        tets: the same of the tets, shape (n_tet,)
+        bodies: 1 awake, 0 asleep, shape (n_body,)
+        tets: the same for the tets, shape (n_tet,)
         inv_mass: 1 / m, 0 for a fixed vertex and asleep [1/kg], shape (n_vert,)
     """
 

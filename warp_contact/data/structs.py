@@ -8,7 +8,7 @@ from warp_contact.kernels.mobility import Mobility
 
 
 def mesh_of(model: Model, surface: wp.Bvh) -> Mesh:
-    """What a search for contacts reads; ``surface`` is a Bvh over the triangles, by body."""
+    """What the search for contacts reads; ``surface`` is a Bvh over the triangles, by body."""
     mesh = Mesh()
     mesh.edge = float(model.body_edge.numpy().min())
     mesh.n_body, mesh.bvh = model.n_body, surface.id
@@ -26,7 +26,7 @@ def mesh_of(model: Model, surface: wp.Bvh) -> Mesh:
 
 
 def mobility_of(model: Model) -> Mobility:
-    """How the vertices answer an impulse: the one place where the contact solver gets it from."""
+    """How the vertices answer an impulse: the only source for the contact solver."""
     mobility = Mobility()
     mobility.inv_mass = model.inv_mass
     return mobility

@@ -9,15 +9,15 @@ from warp_contact.kernels.surface.residual import OLD, OPEN, WAS_OLD
 
 @dataclass
 class Surface:
-    """What the impulses left of overlaps, and the way to the common surface.
+    """Residual overlaps after the impulses, and the search for the common surface.
 
     Attributes:
         found: the three below, shape (3,)
         of_step: the first two of them, which are those of a step, shape (2,)
         any_open: whether some overlap is to be closed, shape (1,)
-        any_old: whether some is to be searched, as no step created it, shape (1,)
-        was_old: whether there was any to be searched since the frame began, shape (1,)
-        residual: overlap after the impulses, 0 up to a tolerance [m], shape (contacts,)
+        any_old: whether some is for the search, being older than the step, shape (1,)
+        was_old: whether there was any for the search since the frame began, shape (1,)
+        residual: residual overlap, 0 up to a tolerance [m], shape (contacts,)
         slack: part of it that later steps close [m], shape (contacts,)
         push: of the closure [kg m], shape (contacts,)
         mask: tets that touch the region, shape (n_tet,)
@@ -25,7 +25,7 @@ class Surface:
         area: areas of comparison [m^2], shape (n_vert,)
         at_start, at_trial: tractions before the search and at a trial [Pa], shape (n_vert,)
         stiffness: traction gained over the whole of s [Pa], shape (n_vert,)
-        fraction: part of s, shape (n_vert,)
+        fraction: the part of s that a vertex moves, shape (n_vert,)
         upper_mean, lower_mean: of traction, stiffness, fraction at both sides of each contact,
             shape (contacts,)
     """
@@ -50,7 +50,7 @@ class Surface:
 
 
 def allocate(n_vert: int, n_tet: int, n_contact: int) -> Surface:
-    """Nothing was found yet."""
+    """Allocate without any overlap."""
     found = wp.zeros(3, dtype=int)
     return Surface(
         found=found,

@@ -1,4 +1,4 @@
-"""What repeated sweeps over the contacts remember, those of impulses and those of the closure."""
+"""The state of repeated sweeps over the contacts, for the impulses and for the closure."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ import warp as wp
 
 @dataclass
 class Sweeps:
-    """Counters of sweeps, and what a sweep leaves alone.
+    """Counters of sweeps, and which contacts a sweep leaves alone.
 
     Attributes:
         number: sweeps so far, shape (1,)
         again: whether another is needed, shape (1,)
-        busy: 2 where the last sweep changed the impulses, 1 a little, 0 where it left them alone,
+        busy: 2 where the last sweep changed the impulses, 1 negligibly, 0 where it left them alone,
             shape (contacts,)
         changed: the last sweep, if it changed the velocity of a vertex, else 0, shape (n_vert,)
         served: the last sweep that added anything to a vertex, shape (n_vert,)
@@ -26,7 +26,7 @@ class Sweeps:
 
 
 def allocate(n_vert: int, n_contact: int) -> Sweeps:
-    """There was no sweep yet."""
+    """Allocate before any sweep."""
     return Sweeps(
         number=wp.zeros(1, dtype=int),
         again=wp.zeros(1, dtype=int),

@@ -12,12 +12,12 @@ PARTS = (
     "edges",  # contacts of edges
     "layers",  # depth of penetrations behind the border
     "warm start",  # impulses start from those of the last step
-    "persistent edges",  # contacts of edges go on from step to step
+    "persistent edges",  # contacts of edges persist from step to step
     "extrapolation",  # sweeps run from extrapolated impulses
-    "search",  # for the surface between bodies that overlap from before
-    "closure",  # projection of what overlaps onto the planes of triangles
+    "search",  # for the surface between bodies whose overlap is older than the step
+    "closure",  # projection of overlaps onto the planes of triangles
     "old planes",  # the first closure leaves out contacts that seem older than the step
-    "second look",  # at the contacts after the closure
+    "second look",  # a detection pass after the closure
     "strays",  # vertices that left their triangle are closed as well
     "closure torque",  # handed back to the velocities
 )

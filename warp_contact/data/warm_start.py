@@ -1,7 +1,7 @@
-"""The impulses of the last step, from which the next one starts: also across frames.
+"""Warm start: the impulses of the last step, from which the next one starts, also across frames.
 
-One cache, keyed by what presses and the body that it presses on: a vertex with its first contact,
-an edge with all its contacts, which go on themselves.
+One cache, keyed by a vertex or an edge and the body that it touches. A vertex has the impulse of
+its first contact. An edge has all its contacts, which are persistent.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact
 
 @dataclass
 class WarmStart:
-    """What a step needs to know of the one before, beside the state.
+    """What a step needs of the one before, beside the state.
 
     Attributes:
         partner: body of each vertex' first contact in the last step, -1 for none, shape (n_vert,)
@@ -30,7 +30,7 @@ class WarmStart:
 
 
 def allocate(n_vert: int, n_contact: int) -> WarmStart:
-    """Room for so many vertices and contacts; there was no step yet."""
+    """Allocate before any step."""
     return WarmStart(
         partner=wp.full(n_vert, -1, dtype=int),
         kept=wp.zeros(n_vert, dtype=wp.vec4),
@@ -40,7 +40,7 @@ def allocate(n_vert: int, n_contact: int) -> WarmStart:
 
 
 def copy(to: WarmStart, of: WarmStart) -> None:
-    """Overwrite one with another; there is room for its contacts."""
+    """Overwrite one with another, whose contacts fit."""
     wp.copy(to.partner, of.partner)
     wp.copy(to.kept, of.kept)
     wp.copy(to.n_edge, of.n_edge)
@@ -56,7 +56,7 @@ def values(warm: WarmStart) -> dict[str, np.ndarray]:
 
 
 def restore(warm: WarmStart, stored: dict[str, np.ndarray]) -> None:
-    """Take over the ``values`` of another one; there is room for them."""
+    """Take over the ``values`` of another one; they fit."""
     warm.partner.assign(stored["partner"])
     warm.kept.assign(stored["kept"])
     warm.n_edge.assign(stored["n_edge"])

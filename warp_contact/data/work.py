@@ -23,22 +23,22 @@ from warp_contact.kernels.mobility import Mobility
 
 @dataclass
 class Work:
-    """Forgotten after each step, but for ``warm``, the broad phase and the forces of the frame.
+    """Rewritten in each step, except for ``warm``, the broad phase and the forces of the frame.
 
     Attributes:
-        capacity: what there is room for
+        capacity: of the lists
         overflow: what did not fit
         dt: the step [s], shape (1,)
         share: of the stages of the damping [-], shape (1,)
         steps: how many the frame still has, shape (1,)
         awake: what moves
-        mesh: what searches for contacts read of the model
+        mesh: what the search for contacts reads of the model
         mobility: how vertices answer impulses
         f_tet: forces on the corners of each tet [N], shape (4 n_tet,)
-        x: predicted positions, then those before stage 4 [m], shape (n_vert,)
+        x: predicted positions, then those before the search [m], shape (n_vert,)
         v: scratch of the damping [m/s], shape (n_vert,)
         broad_phase: which pairs may touch
-        narrow_phase: which of them do, on the way to contacts
+        narrow_phase: intermediate results on the way to the contacts
         contacts: the contacts of the step
         sweeps: counters of the sweeps over them
         surface: scratch of the search for the contact surface
@@ -82,7 +82,7 @@ def allocate_work(
     awake: Awake | None = None,
     unit: float = 1.0,
 ) -> Work:
-    """Room for a step on the current device; the Bvhs are built around ``state.x``.
+    """Allocate for a step on the current device; the Bvhs are built around ``state.x``.
 
     Args:
         model: what does not change

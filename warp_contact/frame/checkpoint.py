@@ -55,6 +55,6 @@ def read(path: str | os.PathLike, scene: str) -> dict[str, np.ndarray]:
     return values
 
 
-def part(values: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+def group(values: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
     """The values called ``name.something``, by something."""
     return {k.removeprefix(f"{name}."): v for k, v in values.items() if k.startswith(f"{name}.")}

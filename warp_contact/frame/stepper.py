@@ -209,9 +209,9 @@ class Stepper:
     def restore(self, values: dict[str, np.ndarray]) -> None:
         """Take over the ``values`` of another one of the same scene and settings."""
         self.n = int(values["substeps"])
-        self.spectrum.start_from(checkpoint.part(values, "start"))
-        sleeping = checkpoint.part(values, "sleeping")
-        impulses = checkpoint.part(values, "warm")
+        self.spectrum.start_from(checkpoint.group(values, "start"))
+        sleeping = checkpoint.group(values, "sleeping")
+        impulses = checkpoint.group(values, "warm")
         have = self.work.capacity
         pairs = max(have.pairs, len(sleeping.get("pair_key", ())))
         contacts = max(have.contacts, len(impulses["edges"]))
@@ -240,7 +240,7 @@ class Stepper:
             work.forces.pair_total.zero_()
         n = self._step_count.steps(self._state, omega, last, frame, bool(self.overlapping))
         dt = 1.0 / (self.fps * n)
-        stages = stages_for(rate, dt)
+        damping_stages = stages_for(rate, dt)
         if self.dt is not None and dt != self.dt:
             work.dt.fill_(0.5 * (self.dt - dt))
             kick(self._model, self._state, work)  # velocities lag by half a step
@@ -254,7 +254,7 @@ class Stepper:
         part = PART if in_parts else n
         for first in range(0, n, part):
             work.steps.fill_(min(part, n - first))
-            wp.capture_launch(self._graph(stages))
+            wp.capture_launch(self._graph(damping_stages))
             if enlarged(work) is not None:
                 break
             after, wrong = self._look()
@@ -262,13 +262,13 @@ class Stepper:
                 break
         return dt, after, wrong
 
-    def _graph(self, stages: int) -> wp.Graph:
+    def _graph(self, damping_stages: int) -> wp.Graph:
         """The captured steps of a frame, with so many stages of damping."""
-        key = stages, self.overlapping
+        key = damping_stages, self.overlapping
         if key not in self._graphs:
             one = step_of(self._response, bool(self.overlapping))
             with wp.ScopedCapture() as capture:
-                take_steps(self._model, self._state, self.work, stages, one)
+                take_steps(self._model, self._state, self.work, damping_stages, one)
             self._graphs[key] = capture.graph
         return self._graphs[key]
 

@@ -1,6 +1,6 @@
-"""Which vertices may come to lie in which bodies, and which edges may come to cross them.
+"""Broad phase: which vertices may enter which bodies, and which edges may cross them.
 
-Found now and then, kept for many steps.
+Pairs are found now and then, and kept for many steps.
 """
 
 from functools import partial
@@ -18,7 +18,7 @@ from warp_contact.kernels.broad_phase import pairs as kernels
 
 
 def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
-    """Find the pairs at ``x0`` unless those at hand hold for a step from ``x0`` to ``x1``."""
+    """Find the pairs at ``x0`` unless the present ones hold for a step from ``x0`` to ``x1``."""
     b = work.broad_phase
     if not on("broad phase kept"):
         b.stale.fill_(1)
@@ -32,7 +32,7 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
 
 
 def track(model: Model, x: wp.array, work: Work) -> None:
-    """Let the bodies go on to ``x``, where pairs are looked at; ``n_new`` is 0 then."""
+    """Begin a detection pass at ``x``: add the distances travelled, and set ``n_new`` to 0."""
     b = work.broad_phase
     _move(model, x, work)
     outputs = [b.motion, b.recent, b.travelled, work.narrow_phase.n_new]
@@ -69,7 +69,7 @@ def _list_none(work: Work) -> None:
 
 
 def _move(model: Model, x: wp.array, work: Work) -> None:
-    """Add to ``motion`` what is new at ``x``."""
+    """Update ``motion`` by the motion up to ``x``."""
     b = work.broad_phase
     chunks = -(-model.n_vert // int(skins.CHUNK))
     inputs = [model.vert_body, x]
@@ -111,7 +111,7 @@ def _find_near(model: Model, work: Work) -> None:
         dim=model.n_body,
         inputs=[model.cell, b.skin, b.bodies.id, model.body_world, model.body_vert]
         + [work.awake.bodies, b.lower, b.upper, b.x],
-        outputs=[of.n_near, of.near, of.slab, of.end, b.any_pair],
+        outputs=[of.n_near, of.other, of.slab, of.end, b.any_pair],
     )
 
 
@@ -123,7 +123,7 @@ def _find_parts(model: Model, work: Work) -> None:
     b.n_found.zero_()
     wp.launch(
         near.near_parts,
-        dim=of.near.shape,
+        dim=of.other.shape,
         inputs=[b.skin, work.mesh, of, b.x],
         outputs=[of.part, b.near_tri, b.n_found],
     )

@@ -23,7 +23,7 @@ def order_by_vertex(model: Model, work: Work) -> None:
 
 
 def count_contacts(work: Work, of_edges: wp.array, places: wp.array) -> None:
-    """Set ``contacts.n``: those of vertices, and so many of edges at so many places."""
+    """Set ``contacts.n``: those of vertices and ``of_edges`` of edges, which take ``places``."""
     wp.launch(
         kernels.total_contacts,
         dim=1,

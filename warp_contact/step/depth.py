@@ -10,7 +10,7 @@ from warp_contact.kernels.narrow_phase import depth as kernels
 
 
 def find_depths(model: Model, x: wp.array, work: Work) -> None:
-    """Set depth, direction and layer of the penetrations at ``x``; once for each list of them."""
+    """Set depth, direction and layer of the penetrations at ``x``; call once for each list."""
     n = work.narrow_phase
     launch_over(
         kernels.border_depth,

@@ -1,4 +1,4 @@
-"""A whole look for contacts at some positions, without any from the step before."""
+"""A complete detection pass at given positions, without persistent contacts."""
 
 import warp as wp
 
@@ -9,7 +9,7 @@ from warp_contact.step import impulse, narrow_phase
 
 
 def detect(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
-    """Contacts of vertices and edges at ``x``, in a step from ``x0``, and what holds them."""
+    """Contacts of vertices and edges at ``x``, in a step from ``x0``, and their constants."""
     narrow_phase.find_inner_vertices(model, x0, x, work)
     narrow_phase.forget_edges(work)
     narrow_phase.find_inner_edges(model, x0, x, work)

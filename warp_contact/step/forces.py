@@ -8,8 +8,8 @@ from warp_contact.data.model import Model
 from warp_contact.kernels.motion import motion
 
 RATE_MARGIN = 1.1  # on the damping rate, which is estimated and grows within a frame
-USED_RANGE = 0.95  # of the range of the stages that is used: at its end they do not damp
-SHARE = 0.5, 7.0 / 9.0  # least and largest: modes turn round at a sixth of their speed at most
+USED_RANGE = 0.95  # part of the stable range that is used: at its end the stages do not damp
+SHARE = 0.5, 7.0 / 9.0  # least and largest: a mode changes sign at a sixth of its speed at most
 
 
 def internal_forces(model: Model, x: wp.array, mask: wp.array, f_tet: wp.array) -> None:
@@ -105,7 +105,7 @@ def stages_for(rate: float, dt: float) -> int:
 
 
 def share_for(rate: float, dt: float) -> float:
-    """Return the least share that reaches then: with less, fast modes turn round less."""
+    """Return the smallest share that is stable then: it reverses fast modes the least."""
     stages = stages_for(rate, dt)
     needed = RATE_MARGIN * rate * dt / reach(stages, 1.0) if stages > 1 else 0.0
     return max(SHARE[0], needed)

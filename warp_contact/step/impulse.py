@@ -17,17 +17,19 @@ from warp_contact.step.contact_graph import order_by_vertex
 from warp_contact.step.narrow_phase import append_edge_contacts
 
 SWEEPS = 48  # at most; few clusters of contacts last so long
-NEGLIGIBLE = 0.1  # of the tolerance, at the shortest edge: a change that changes no other contact
+NEGLIGIBLE = (
+    0.1  # of the tolerance, at the shortest edge: a smaller change affects no other contact
+)
 
 
 def solve(model: Model, state: State, work: Work) -> None:
-    """Change ``state.v`` by impulses at the contacts found, from those of the last step on."""
+    """Change ``state.v`` by impulses at the contacts found, starting from those of the last step."""
     none = partial(warm_start.forget_edges, work)
     if_any(work.contacts.n, _solve_from_last, model, state, work, otherwise=none)
 
 
 def add_edges(model: Model, state: State, work: Work) -> None:
-    """Add the contacts of edges that were found since; those at hand keep their impulses."""
+    """Add the contacts of edges that were found since; the others keep their impulses."""
     if_any(work.narrow_phase.n_new, _add_edges, model, state, work)
 
 
@@ -52,7 +54,7 @@ def forget(work: Work) -> None:
 
 
 def begin(model: Model, x0: wp.array, work: Work) -> None:
-    """Order the contacts by vertex, and set what holds them; none has an impulse yet."""
+    """Order the contacts by vertex, and set their constants; none has an impulse yet."""
     _begin(model, x0, work, work.narrow_phase.none)
 
 

@@ -1,4 +1,4 @@
-"""The steps of a frame as one loop on the device, of whichever response."""
+"""The steps of a frame as one loop on the device, for any response."""
 
 from collections.abc import Callable
 from functools import partial
@@ -15,13 +15,13 @@ from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.step.step import step, step_overlapping
 
 
-def take_steps(model: Model, state: State, work: Work, stages: int, one: Callable) -> None:
+def take_steps(model: Model, state: State, work: Work, damping_stages: int, one: Callable) -> None:
     """Take ``work.steps`` steps by the function ``one``; for a capture."""
-    while_any(work.steps, _take_one, model, state, work, stages, one)
+    while_any(work.steps, _take_one, model, state, work, damping_stages, one)
 
 
 def step_of(response: ContactSurface | Penalty | PredictedForce, overlapping: bool) -> Callable:
-    """The step of a response, where bodies may or may not overlap from before."""
+    """The step of a response; ``overlapping`` where bodies may have overlapped before."""
     if isinstance(response, Penalty):
         return partial(step_penalty, response=response)
     if isinstance(response, PredictedForce):
@@ -33,6 +33,6 @@ def step_of(response: ContactSurface | Penalty | PredictedForce, overlapping: bo
     return step
 
 
-def _take_one(model: Model, state: State, work: Work, stages: int, one: Callable) -> None:
-    one(model, state, work, stages)
+def _take_one(model: Model, state: State, work: Work, damping_stages: int, one: Callable) -> None:
+    one(model, state, work, damping_stages)
     wp.launch(motion.count_down, dim=1, inputs=[work.overflow.all], outputs=[work.steps])

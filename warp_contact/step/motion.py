@@ -9,15 +9,25 @@ from warp_contact.kernels.motion import motion
 from warp_contact.step.forces import damp, internal_forces
 
 
-def predict(model: Model, state: State, work: Work, stages: int) -> None:
+def predict(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Damp ``state.v`` in so many stages, kick it, set ``work.x`` = x + h v.
 
-    In this order: damping after the kick would hand the forces of vertices at rest in a contact on
-    to their neighbours before the impulses see them, and rest would depend on the damping.
+    In this order: after the kick, damping would pass the load of vertices at rest in a contact on to
+    their neighbours before the impulses act, and the state at rest would depend on the damping.
     """
-    if stages > 0:
+    if damping_stages > 0:
         scratch, inv_mass = (work.v, work.surface.s), work.awake.inv_mass
-        damp(model, state.x, state.v, inv_mass, work.dt, work.f_tet, scratch, stages, work.share)
+        damp(
+            model,
+            state.x,
+            state.v,
+            inv_mass,
+            work.dt,
+            work.f_tet,
+            scratch,
+            damping_stages,
+            work.share,
+        )
     kick(model, state, work)
 
 

@@ -1,8 +1,8 @@
-"""Which vertices lie inside other bodies, which edges cross them: the contacts of a step.
+"""Narrow phase: which vertices lie inside other bodies, and which edges cross them.
 
-A contact is looked for in one of two ways. Where bodies did not overlap when the step began (they
-were apart), whatever overlaps has come in within the step, and the side by which it came tells the
-direction. Where they may have overlapped before, the depth alone does.
+There are two ways to find a contact. If bodies were apart when the step began, every overlap has
+arisen within the step, and the side by which a vertex came in tells the direction. If they may have
+overlapped before, only the depth does.
 """
 
 from functools import partial
@@ -30,7 +30,7 @@ def find_inner_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> 
 
 
 def find_entered_edges(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
-    """Contacts of the edges across other bodies at ``x``, beside those that have a place."""
+    """Contacts of the edges across other bodies at ``x``, beside the persistent ones."""
     _find_edges(model, x0, x, work, apart=True)
 
 
@@ -40,13 +40,13 @@ def find_inner_edges(model: Model, x0: wp.array, x: wp.array, work: Work) -> Non
 
 
 def forget_edges(work: Work) -> None:
-    """No contact of an edge has a place."""
+    """Begin without contacts of edges."""
     work.narrow_phase.place.fill_(-1)
     work.narrow_phase.n_place.zero_()
 
 
 def continue_edges(model: Model, x0: wp.array, work: Work) -> None:
-    """Let the contacts of edges go on that pressed in the last step; this one begins at ``x0``."""
+    """Begin with the persistent contacts of edges; the step begins at ``x0``."""
     none = partial(forget_edges, work)
     if not on("persistent edges"):
         return none()
@@ -54,7 +54,7 @@ def continue_edges(model: Model, x0: wp.array, work: Work) -> None:
 
 
 def append_edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
-    """Set the contacts of the edges that have a place, behind those of the vertices."""
+    """List the contacts of edges found so far, behind those of the vertices."""
     n, c = work.narrow_phase, work.contacts
     launch_over(
         edges.edge_contacts,

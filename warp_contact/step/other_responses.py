@@ -13,9 +13,11 @@ from warp_contact.step.motion import drift, predict
 from warp_contact.step.response import Penalty
 
 
-def step_literal(model: Model, state: State, work: Work, stages: int, iterations: int) -> None:
+def step_literal(
+    model: Model, state: State, work: Work, damping_stages: int, iterations: int
+) -> None:
     """The paper as printed: displacement first, then velocities."""
-    predict(model, state, work, stages)
+    predict(model, state, work, damping_stages)
     broad_phase.refresh(model, state.x, work.x, work)
     wp.copy(state.x, work.x)
     detect_vertices(model, state.x, state.x, work)
@@ -25,19 +27,21 @@ def step_literal(model: Model, state: State, work: Work, stages: int, iterations
     impulse.record(work)
 
 
-def step_penalty(model: Model, state: State, work: Work, stages: int, response: Penalty) -> None:
+def step_penalty(
+    model: Model, state: State, work: Work, damping_stages: int, response: Penalty
+) -> None:
     """Penalty forces: they belong to the positions at which they act."""
     broad_phase.refresh(model, state.x, state.x, work)
     detect(model, state.x, state.x, work)
-    predict(model, state, work, stages)
+    predict(model, state, work, damping_stages)
     if_any(work.contacts.n, _push, model, state, work, response)
     impulse.record(work)
     drift(model, state, work, state.x)
 
 
-def step_predicted(model: Model, state: State, work: Work, stages: int) -> None:
+def step_predicted(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Forces that close the gaps predicted for the end of the step; overlaps may last."""
-    predict(model, state, work, stages)
+    predict(model, state, work, damping_stages)
     broad_phase.refresh(model, state.x, work.x, work)
     detect(model, state.x, work.x, work)
     if_any(work.contacts.n, _push_apart, model, state, work)

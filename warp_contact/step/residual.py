@@ -1,4 +1,4 @@
-"""What the impulses leave of overlaps: the work of the closure and of the search."""
+"""Residual overlaps after the impulses, for the closure and the search."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""How bodies answer to an overlap: what ``Simulation(response=...)`` takes."""
+"""How bodies respond to contact: what ``Simulation(response=...)`` takes."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The search for the contact surface, of overlaps that no step created: eqs. (1) and (2)."""
+"""The search for the contact surface, for overlaps older than the step: eqs. (1) and (2)."""
 
 import math
 
@@ -13,7 +13,7 @@ from warp_contact.step.forces import internal_forces
 
 
 def begin(model: Model, x: wp.array, work: Work) -> None:
-    """Set the displacement vectors ``s``, the touching tets and ``x`` before the search."""
+    """Set the displacement vectors, the touching tets, and ``work.x`` before the search."""
     c, s = work.contacts, work.surface
     wp.copy(work.x, x)
     wp.launch(
@@ -53,7 +53,7 @@ def balance(model: Model, x: wp.array, work: Work, iterations: int) -> None:
 
 
 def bisect(model: Model, x: wp.array, work: Work, iterations: int) -> None:
-    """Move the region to where the search of the paper, as printed, leaves it."""
+    """Move the region to where the search as the paper prints it ends."""
     begin(model, x, work)
     s = work.surface
     wp.launch(

@@ -1,7 +1,7 @@
 """One time step of the default response, read from top to bottom.
 
-``step`` is that of bodies that were apart when it began, ``step_overlapping`` that of bodies that
-may overlap from before, such as those that start inside each other.
+``step`` is for bodies that were apart when it began. ``step_overlapping`` is for bodies that may
+have overlapped before, such as those that start inside each other.
 """
 
 from functools import partial
@@ -16,14 +16,14 @@ from warp_contact.step import broad_phase, impulse, narrow_phase, surface
 from warp_contact.step.motion import drift, predict
 
 
-def step(model: Model, state: State, work: Work, stages: int) -> None:
+def step(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Advance ``state`` in place by ``work.dt``, symplectic Euler.
 
-    No read-back and no allocation, so that a caller may capture it. ``stages`` are those of the
-    damping.
+    No read-back and no allocation, so that a caller may capture it. ``damping_stages`` is how
+    many the damping takes.
     """
     fly = partial(in_free_flight, state, work)
-    predict(model, state, work, stages)
+    predict(model, state, work, damping_stages)
     broad_phase.refresh(model, state.x, work.x, work)
     if_any(work.broad_phase.any_pair, in_contact, model, state, work, otherwise=fly)
 
@@ -33,8 +33,8 @@ def in_contact(model: Model, state: State, work: Work) -> None:
     narrow_phase.find_entered_vertices(model, state.x, work.x, work)
     narrow_phase.continue_edges(model, state.x, work)
     impulse.solve(model, state, work)
-    # The impulses may have led other edges across each other. Were these left to the closure, they
-    # would go on to approach, and what it displaces would gain energy.
+    # The impulses may have led other edges across each other. If these were left to the closure,
+    # they would keep approaching, and its displacements would add energy.
     drift(model, state, work, work.x)
     narrow_phase.find_entered_edges(model, state.x, work.x, work)
     impulse.add_edges(model, state, work)
@@ -45,15 +45,17 @@ def in_contact(model: Model, state: State, work: Work) -> None:
 
 
 def in_free_flight(state: State, work: Work) -> None:
-    """The rest of the step where none can touch."""
+    """The rest of the step where no bodies can touch."""
     wp.copy(state.x, work.x)
     impulse.forget(work)
 
 
-def step_overlapping(model: Model, state: State, work: Work, stages: int, iterations: int) -> None:
-    """The same where bodies may overlap from before; ``iterations`` are those of the search."""
+def step_overlapping(
+    model: Model, state: State, work: Work, damping_stages: int, iterations: int
+) -> None:
+    """The same where bodies may have overlapped before; ``iterations`` are those of the search."""
     fly = partial(in_free_flight, state, work)
-    predict(model, state, work, stages)
+    predict(model, state, work, damping_stages)
     broad_phase.refresh(model, state.x, work.x, work)
     if_any(work.broad_phase.any_pair, in_overlap, model, state, work, iterations, otherwise=fly)
 
@@ -61,7 +63,7 @@ def step_overlapping(model: Model, state: State, work: Work, stages: int, iterat
 def in_overlap(model: Model, state: State, work: Work, iterations: int) -> None:
     """The rest of such a step."""
     narrow_phase.find_inner_vertices(model, state.x, work.x, work)
-    narrow_phase.forget_edges(work)  # what is moved apart is not what the impulses held
+    narrow_phase.forget_edges(work)  # none persists while bodies are moved apart
     impulse.solve(model, state, work)
     drift(model, state, work, work.x)
     narrow_phase.find_inner_edges(model, state.x, work.x, work)

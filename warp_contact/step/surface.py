@@ -1,4 +1,4 @@
-"""The end of a step: what still overlaps is moved onto a common surface. No motion comes of it."""
+"""The end of a step: residual overlaps are displaced onto a common surface, without velocity."""
 
 import math
 
@@ -17,7 +17,7 @@ from warp_contact.step.detection import detect, detect_apart
 
 
 def close_gaps(model: Model, state: State, work: Work) -> None:
-    """Close what the impulses left, where bodies were apart when the step began."""
+    """Close the residual overlaps, where bodies were apart when the step began."""
     residual.add_gaps(model, state.x, work)
     if on("strays"):
         residual.add_strays(model, state.x, work)
@@ -25,7 +25,7 @@ def close_gaps(model: Model, state: State, work: Work) -> None:
 
 
 def resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
-    """Search the surface between bodies that overlapped before the step, close what is left."""
+    """Search the surface between bodies that overlapped before the step, then close the rest."""
     if not on("search"):
         return close_gaps(model, state, work)
     residual.add_gaps(model, state.x, work)
@@ -47,11 +47,10 @@ def close_all(model: Model, state: State, work: Work) -> None:
 
 
 def _close_gaps(model: Model, state: State, work: Work) -> None:
-    # No overlap can be older than the step: one that seems so has a wrong plane, and the look that
-    # follows may find a better one.
+    # No overlap can be older than the step. One that seems so has a wrong plane; the detection pass
+    # that follows may find a better one.
     close(model, state, work)
-    # Where vertices came to lie, their triangles may be others than before, and edges may cross
-    # that the narrow phase could not see.
+    # The closure may have moved vertices to other triangles, and edges across each other.
     if on("second look"):
         detect_apart(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
@@ -68,7 +67,7 @@ def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -
 
 
 def _close(model: Model, state: State, work: Work, deep: float) -> None:
-    """Leave contacts out that overlapped by more than ``deep``, of an edge, at the start."""
+    """Close all contacts but those that overlapped by more than ``deep`` edges at the start."""
     if not on("closure"):
         return
     c, s = work.contacts, work.surface

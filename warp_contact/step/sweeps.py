@@ -17,7 +17,7 @@ def repeat(work: Work, sweep: Callable, *arguments) -> None:
 
 
 def count(work: Work, first: bool = False) -> None:
-    """Count a sweep, from 1 on where it is the first, and ask for no other."""
+    """Count a sweep, from 1 on if it is the first, and ask for no other yet."""
     outputs = [work.sweeps.again, work.sweeps.number]
     wp.launch(kernels.next_sweep, dim=1, inputs=[first], outputs=outputs)
 

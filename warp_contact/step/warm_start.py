@@ -1,4 +1,4 @@
-"""The start of the impulses from those of the last step."""
+"""Warm start: the impulses start from those of the last step."""
 
 from warp_contact.data.launch import launch_over
 from warp_contact.data.work import Work
@@ -17,7 +17,7 @@ def recall_vertices(work: Work) -> None:
 
 
 def recall_edges(work: Work) -> None:
-    """Let the contacts of edges go on from the impulses that they have."""
+    """Start the contacts of edges from the impulses that they have."""
     c, n = work.contacts, work.narrow_phase
     launch_over(
         kernels.recall_edges,
@@ -51,11 +51,11 @@ def keep_edges(work: Work) -> None:
 
 
 def forget_edges(work: Work) -> None:
-    """There are no contacts of edges for the next step to go on with."""
+    """The next step has no persistent contacts of edges."""
     work.warm.n_edge.zero_()
 
 
 def forget(work: Work) -> None:
-    """There are no impulses to start the next step from."""
+    """The next step has no impulses to start from."""
     work.warm.partner.fill_(-1)
     forget_edges(work)

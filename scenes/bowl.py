@@ -2,7 +2,7 @@
 
 The paper's Fig. 9, with its 16030 vertices and 27116 surface triangles: a dish that does not move
 and 332 coarse fruits, apples, lemons, melons and bananas. Look at the pile: it comes to rest with
-every fruit lying on its neighbours, though a pair of them shares but a few touching vertices.
+every fruit lying on its neighbours, although any two touch at only a few vertices.
 
 The fruits start in layers that alternate between the shapes, low above the dish, with a seeded
 jitter. Each keeps to its own slot, an upright cylinder that contains it, so nothing overlaps.

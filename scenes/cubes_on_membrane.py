@@ -1,8 +1,8 @@
 """Three cubes of masses 1 : 4 : 16 on a membrane that is held at its rim.
 
 The paper's Fig. 7, with its 323 vertices and 624 surface triangles. Look at the heavy cube: it sags
-with the membrane but does not sink into it. With penalty forces it sinks in by W / (n k), the
-weight W over n vertices of stiffness k, and stiffness enough for it is too much for the light one.
+with the membrane but does not sink into it. With penalty forces it sinks in by W / (n k), for a
+weight W on n vertices of stiffness k. A stiffness that holds it is too high for the light cube.
 """
 
 import numpy as np

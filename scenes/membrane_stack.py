@@ -1,8 +1,8 @@
 """Nine membranes fall onto each other on a floor.
 
 The paper's Fig. 10, with its 2178 vertices and 4320 surface triangles. Look at kinetic and
-potential energy over time: the stack comes to rest and stays as high as its own weight lets it be.
-With penalty forces it is pressed together further, and it goes on moving for longer.
+potential energy over time: the stack comes to rest and stays as high as its own weight allows. With
+penalty forces it is compressed further and moves for longer.
 """
 
 from warp_contact.scene.materials import NeoHookean

@@ -18,7 +18,7 @@ DENSITY = 1000.0  # [kg/m^3]
 DAMPING = 1e-3  # [s]
 SPEED = 0.02  # of the upper cube, downwards [m/s]
 GAP = 0.001  # at both poles of the sphere [m]
-TURN = (-0.942545, 0.313881, 0.0, 0.1144)  # stands the sphere on a triangle, not on a vertex
+TURN = (-0.942545, 0.313881, 0.0, 0.1144)  # puts the sphere on a triangle, not on a vertex
 
 FRAMES = 120
 VIEW = {"eye": (0.25, -0.85, 0.32), "target": (0.0, 0.0, 0.155)}

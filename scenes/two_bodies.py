@@ -4,7 +4,7 @@ The paper's Fig. 6. The outer ends are held, so the pressure between the blocks 
 the contact surface comes to lie: half-way for equal blocks, and close to the undeformed surface of
 the stiff block for unequal ones. No velocity may appear from resolving the overlap.
 
-For a Poisson's ratio of 0 it is two springs in series: p = g / (L/E1 + L/E2), see ``pressure``.
+For a Poisson's ratio of 0 they are two springs in series: p = g / (L/E1 + L/E2), see ``pressure``.
 """
 
 import numpy as np

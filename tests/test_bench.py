@@ -1,5 +1,6 @@
 """The timer of ``tools/bench.py``: it sees every launch, knows its stage, and changes nothing."""
 
+import pkgutil
 import sys
 from pathlib import Path
 
@@ -8,13 +9,15 @@ import pytest
 import warp as wp
 
 import warp_contact as wc
+import warp_contact.step
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
-from benching.cases import copies, pile
-from benching.memory import held
-from benching.stages import MEMORY, OTHER, STAGES, StageTimer
-from benching.window import Timing, measure
+from clock.figures import step_figures
+from clock.memory import held
+from clock.scenes import copies, pile
+from clock.timer import ALONE, MEMORY, OTHER, StageTimer
+from clock.window import Cost, Timing, measure
 
 
 @pytest.fixture
@@ -32,20 +35,22 @@ def touching(device) -> wc.Simulation:
 def test_every_launch_belongs_to_a_stage(touching):
     timing = measure(touching, repeats=2, steps=3)
     assert timing.contacts > 0
-    assert {stage for stage, _ in timing.kernels} == set(STAGES)
-    assert sum(timing.launches.values()) == pytest.approx(
-        sum(launches for launches, _ in timing.kernels.values())
-    )
-    assert all(size > 0 for size in timing.given.values())
+    modules = {module.name for module in pkgutil.iter_modules(warp_contact.step.__path__)}
+    found = set(timing.stages) - {ALONE}
+    assert {"forces", "broad_phase", "narrow_phase", "impulse"} <= found <= modules - {"step"}
+    assert timing.whole.launches == pytest.approx(sum(c.launches for c in timing.kernels.values()))
+    assert all(cost.bytes > 0 for cost in timing.stages.values())
     assert timing.step_ms > 0.0
     assert timing.elastic_ms > 0.0
 
 
-def test_shares_are_those_of_the_time_and_none_without_any():
-    none = dict(steps=1, step_ms=0.0, elastic_ms=0.0, contacts=0.0, launches={}, given={})
-    none |= dict(kernels={}, bytes=0)
-    assert Timing(ms={"a": 3.0, "b": 1.0}, **none).shares == {"a": 0.75, "b": 0.25}
-    assert Timing(ms={"a": 0.0, "b": 0.0}, **none).shares == {"a": 0.0, "b": 0.0}
+def test_shares_are_those_of_the_time_and_none_without_any(touching):
+    for times, shares in (((2.0, 1.0, 1.0), (0.75, 0.25)), ((0.0, 0.0, 0.0), (0.0, 0.0))):
+        keys = ("a", "x"), ("a", "y"), ("b", "x")
+        kernels = {key: Cost(1.0, ms, 8.0) for key, ms in zip(keys, times, strict=True)}
+        found = step_figures(Timing(1, 1.0, 1.0, 0.0, 0, kernels), touching.model)
+        assert (found["a.share"], found["b.share"]) == shares
+        assert found["a.launches"] == 2.0 and found["step.bytes"] == 24.0
 
 
 def test_a_launch_outside_of_a_step_is_seen_as_such(device):
@@ -53,21 +58,17 @@ def test_a_launch_outside_of_a_step_is_seen_as_such(device):
     with StageTimer(device) as timer:
         a.fill_(2.0)
         wp.copy(b, a)
-    assert timer.operations == [(OTHER, "fill_"), (OTHER, "copy")]
-    assert len(timer.ms) == 2
+    assert [o[:3] for o in timer.operations] == [(OTHER, "fill_", 20), (OTHER, "copy", 40)]
     np.testing.assert_array_equal(b.numpy(), 2.0)
 
 
 def test_measuring_leaves_simulation_and_warp_as_they_were(touching):
-    kept = [getattr(owner, name) for owner, name in MEMORY] + [wp.launch]
-    kept += [getattr(owner, name) for functions in STAGES.values() for owner, name in functions]
+    kept = [getattr(owner, name) for owner, name in (*MEMORY, (wp, "launch"))]
     x, v = touching.positions(), touching.velocities()
     measure(touching, repeats=1, steps=2)
     np.testing.assert_array_equal(touching.positions(), x)
     np.testing.assert_array_equal(touching.velocities(), v)
-    after = [getattr(owner, name) for owner, name in MEMORY] + [wp.launch]
-    after += [getattr(owner, name) for functions in STAGES.values() for owner, name in functions]
-    assert after == kept
+    assert [getattr(owner, name) for owner, name in (*MEMORY, (wp, "launch"))] == kept
 
 
 def test_bytes_of_shared_memory_count_once(device):

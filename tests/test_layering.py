@@ -29,7 +29,7 @@ MAY = {  # room: those that it may import, beside itself
 }
 LADDER = (  # of the kernel rooms: each may import those before it
     {"options"},
-    {"geometry", "lengths", "mesh", "mobility", "sorting"},
+    {"geometry", "lengths", "mesh", "mobility", "scan", "sorting"},
     {"elastic"},
     {"motion"},
     {"broad_phase"},

@@ -1,6 +1,8 @@
-"""tools/pareto.py: who dominates whom, the rail of failures, the distance of surfaces."""
+"""tools/pareto.py: who dominates whom, the rail of failures, errors of the paper's scenes."""
 
+import shutil
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +17,8 @@ def tools(monkeypatch):
     monkeypatch.syspath_prepend(TOOLS)
 
 
-def panel():
-    from charting.panel import Panel
+def blocks():
+    from engines.task import Task
 
     import warp_contact as wc
 
@@ -27,70 +29,97 @@ def panel():
             scene.add_body(mesh, rubber, (0.0, 0.0, 0.101 * k), velocity=(0.0, 0.0, -0.5 * k))
         return scene
 
-    return Panel("A", "title", build, 240, 2, lambda panel, motion: 0.0, 1000.0)
+    return Task(build, 240, 2, 1000.0)
 
 
 def test_the_impulses_alone_move_no_surface(monkeypatch):
-    from charting import methods, ours
+    import warp as wp
+    from engines import ours, settings
 
-    from warp_contact.step import step
+    launch, launched = wp.launch, set()
 
-    calls = []
-    monkeypatch.setattr(step, "move_surfaces", lambda *args: calls.append(args))
-    settings = {setting.method: setting for setting in methods.own(quick=True)[::-1]}
-    ours.run(panel(), settings["impulses alone"], None, 60.0)
-    assert calls == []
-    ours.run(panel(), settings["default"], None, 60.0)
-    assert calls != []
+    def noted(kernel, *args, **kwargs):
+        launched.add(kernel.module.name.rpartition(".")[2])
+        return launch(kernel, *args, **kwargs)
+
+    monkeypatch.setattr(wp, "launch", noted)
+    found = {setting.method: setting for setting in settings.own(quick=True)[::-1]}
+    ours.run(blocks(), found["impulses alone"], None, 60.0)
+    assert "impulse" in launched and launched.isdisjoint({"closure", "search"})
+    ours.run(blocks(), found["default"], None, 60.0)
+    assert "closure" in launched
 
 
-def test_held_vertices_stop_where_the_panel_says_so():
-    from charting import methods, ours
-
-    blocks = panel()
+def test_held_vertices_stop_where_the_task_says_so():
+    from engines import ours
+    from engines.settings import DEFAULT
 
     def build():
-        scene = blocks.scene()
+        scene = blocks().scene()
         scene.bodies[1].fixed[:] = True
         return scene
 
-    setting = next(s for s in methods.own(quick=True) if s.method == "default")
-    motion = ours.run(replace(blocks, scene=build, frames=3, stop=1), setting, None, 60.0)
+    motion = ours.run(replace(blocks(), scene=build, frames=3, stop=1), DEFAULT, None, 60.0)
     z = motion.x[:, 8:, 2].mean(axis=1)
     assert z[0] - z[1] == pytest.approx(0.5 / 240, rel=1e-4)  # float32 positions of 0.1 m
     np.testing.assert_array_equal(z[1:], z[1])
 
 
-def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
-    import pareto
-    from charting import methods
-    from charting.panel import Failed, Motion
+def test_a_run_beyond_its_time_fails_and_says_how_far_it_came():
+    from engines import ours
+    from engines.settings import DEFAULT
+    from engines.task import Failed
 
-    own = methods.own(quick=False)
-    own.append(methods.Own("broken", factor=1))
-    own.append(methods.Own("broken", factor=2))
+    with pytest.raises(Failed, match="too slow: 2 of 9 frames in 0 s") as failed:
+        ours.run(replace(blocks(), frames=9), DEFAULT, None, 0.0)
+    assert failed.value.wall > 0.0
+
+
+def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
+    from engines import ours, runs, settings
+    from engines.task import Failed, Motion
+
+    own = settings.own(quick=False)
+    own.append(settings.Own("broken", factor=1))
+    own.append(settings.Own("broken", factor=2))
     alike = dict.fromkeys((s.method, s.times) for s in own)
     alone = {key: 3 + 2 * k for k, key in enumerate(alike)}
     taken = {}
 
-    def run(panel, setting, steps, limit):
+    def run(task, setting, steps, limit):
         if setting.method == "broken":
             raise Failed("not finite")
         taken[setting] = steps
         return Motion(None, None, "", 1.0, 0.0, steps or alone[setting.method, setting.times])
 
-    monkeypatch.setattr(methods, "own", lambda quick: own)
-    monkeypatch.setattr(methods, "PEERS", {})
-    monkeypatch.setattr(pareto.ours, "run", run)
-    points = pareto.one(panel(), False, "", 1.0)
+    monkeypatch.setattr(ours, "run", run)
+    motions = [motion for *_, motion in runs.runs(blocks(), own, {}, "", 1.0)]
     for s, steps in taken.items():
         assert steps == (None if s.factor == 1 else s.factor * alone[s.method, s.times])
-    assert [p.outcome for p in points if p.failed] == ["not finite", "no run with steps x1"]
+    failed = [str(motion) for motion in motions if isinstance(motion, Failed)]
+    assert failed == ["not finite", "no run with steps x1"]
     assert {s.factor for s in taken if s.method == "predicted"} == {1, 2, 4}
 
 
+def test_a_run_that_failed_is_a_point_with_its_reason_in_every_panel():
+    import pareto
+    from chart.panel import Panel
+    from engines.task import Failed, Motion
+
+    def broken(task, motion):
+        raise Failed("bodies apart")
+
+    panels = [Panel("A", "title", lambda *_: 0.5), Panel("B", "title", broken)]
+    found = list(pareto.judge(blocks(), panels, ("m", "1", Failed("too slow", 3.0))))
+    assert [(p.panel, p.outcome, p.wall) for p in found] == [(n, "too slow", 3.0) for n in "AB"]
+    motion = Motion(None, None, "", 1.0, 0.25, 3)
+    first, second = pareto.judge(blocks(), panels, ("m", "1", motion))
+    assert (first.error, first.outcome, first.startup) == (0.5, "ok", 0.25)
+    assert (second.error, second.outcome, second.startup) == (None, "bodies apart", 0.25)
+
+
 def points():
-    from charting.result import Point
+    from chart.points import Point
 
     return [
         Point("A", "quick", "1", 1.0, 1e-1),
@@ -104,7 +133,7 @@ def points():
 
 
 def test_the_front_is_what_no_other_point_beats_in_both():
-    from charting.front import dominates, front
+    from chart.points import dominates, front
 
     p = {point.method: point for point in points()}
     assert [q.method for q in front(points())] == ["quick", "between", "equal", "exact"]
@@ -114,7 +143,7 @@ def test_the_front_is_what_no_other_point_beats_in_both():
 
 
 def test_a_failure_is_behind_everything_and_on_no_front():
-    from charting.front import dominates, fastest_below, front
+    from chart.points import dominates, fastest_below, front
 
     *fine, broken, absent = points()
     assert all(dominates(p, broken) and not dominates(broken, p) for p in fine)
@@ -124,14 +153,14 @@ def test_a_failure_is_behind_everything_and_on_no_front():
 
 
 def test_the_table_keeps_every_point(tmp_path):
-    from charting import result
+    from chart import points as table
 
-    result.write(tmp_path / "points.csv", points())
-    assert result.read(tmp_path / "points.csv") == points()
+    table.write(tmp_path / "points.csv", points())
+    assert table.read(tmp_path / "points.csv") == points()
 
 
 def test_words_and_picture_keep_every_failure(tmp_path):
-    from charting import words
+    from chart import words
 
     text = words.report("head", {"A": "title"}, points())
     assert "failed: broken, 1 of 1: not finite" in text
@@ -142,79 +171,37 @@ def test_words_and_picture_keep_every_failure(tmp_path):
     text = words.report("head", {"A": "title"}, named)
     assert "than a point of the default's front: exact, between, equal\n" in text
     pyplot = pytest.importorskip("matplotlib.pyplot")
-    from charting import plot
+    from chart import picture
 
     figure, ax = pyplot.subplots()
-    plot.panel(ax, "title", points())
-    on_rail = [line for line in ax.lines if list(line.get_ydata()) == [plot.RAIL]]
+    picture.panel(ax, "title", points())
+    on_rail = [line for line in ax.lines if list(line.get_ydata()) == [picture.RAIL]]
     assert len(on_rail) == 2
-    assert {line for line, _ in plot.reasons(points()[-2:])} == {
-        "broken x1: not finite",
-        "absent x1: not installed",
-    }
     pyplot.close(figure)
-
-
-def distance(xa, xb) -> float:
-    """Of two surfaces of one triangle each."""
-    from charting.distance import distance
-
-    tri = np.array([[0, 1, 2]])
-    return distance(np.array(xa), tri, np.array(xb), tri)
-
-
-FLAT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
-PAIRS = {  # second triangle, distance from FLAT
-    "a vertex above the inside": ([[0.2, 0.2, 0.3], [0.2, 1.0, 2.0], [1.0, 0.2, 2.0]], 0.3),
-    "a vertex beside an edge": ([[0.5, -0.4, 0.0], [0.5, -2.0, 1.0], [0.6, -2.0, -1.0]], 0.4),
-    "edges that pass each other": ([[0.5, -1.0, -0.9], [0.5, -1.0, 1.1], [0.5, -2.0, 0.0]], 1.0),
-    "a crossed one above": ([[0.5, -0.5, 0.2], [0.5, 0.5, 0.2], [0.5, 0.0, 2.0]], 0.2),
-    "parallel edges": ([[0.2, -0.3, 0.0], [0.8, -0.3, 0.0], [0.5, -1.0, 1.0]], 0.3),
-    "one that goes through": ([[0.2, 0.2, 0.3], [0.2, 0.2, -0.3], [0.9, 0.9, 0.3]], 0.0),
-    "one apart in its own plane": ([[3.0, 0.0, 0.0], [4.0, 0.0, 0.0], [3.0, 1.0, 0.0]], 2.0),
-}
-
-
-@pytest.mark.parametrize("case", PAIRS)
-def test_the_distance_of_two_triangles(case):
-    other, exact = PAIRS[case]
-    # Double precision on coordinates of order 1.
-    assert distance(FLAT, other) == pytest.approx(exact, abs=1e-14)
-    assert distance(other, FLAT) == pytest.approx(exact, abs=1e-14)
-
-
-def test_the_distance_of_triangles_is_that_of_their_points(rng):
-    weights = np.array([(i, j, 40 - i - j) for i in range(41) for j in range(41 - i)]) / 40.0
-    for _ in range(20):
-        a, b = rng.uniform(-1.0, 1.0, (2, 3, 3))
-        sampled = np.linalg.norm((weights @ a)[:, None] - weights @ b, axis=2).min()
-        exact = distance(a, b)
-        # Each of the two nearest points has one of the samples within a cell, an edge over 40; no
-        # edge is longer than the diagonal of the cube that they are drawn from.
-        assert exact <= sampled + 1e-14
-        assert exact >= sampled - 2.0 * np.sqrt(12.0) / 40.0
 
 
 def held(heights) -> tuple:
     """The squeezed sphere with its upper cube at so many edges over the sphere, frame by frame."""
-    from charting import panel as parts
-    from charting import paper
-    from charting.panel import Motion
+    from chart import scenes
+    from engines.task import Motion, Numbered
+    from verification.setup import mean_edge
 
-    panel = paper.scene("squeezed_sphere", True)
-    scene = panel.scene()
-    x = np.concatenate([body.x for body in scene.bodies])
-    x[parts.part(scene, 1), 2] -= distance_of(scene, 0, 1)
-    unit = min(paper.edge(scene.bodies[k].mesh) for k in (1, 2))
-    frames = np.repeat(x[None], panel.frames + 1, axis=0)
-    top = parts.part(scene, 2)
-    frames[:, top, 2] -= frames[0, top, 2].min() - frames[0, parts.part(scene, 1), 2].max()
-    frames[:, top, 2] += unit * np.broadcast_to(heights, panel.frames + 1)[:, None]
-    return panel, Motion(frames, np.zeros_like(frames), "neo-hookean", 1.0, 0.0, 1)
+    task, panels = scenes.scene("squeezed_sphere", True)
+    scene = task.scene()
+    whole = Numbered(scene)
+    _, ball, top = whole.parts
+    x = whole.rest.copy()
+    x[ball, 2] -= distance_of(scene, 0, 1)
+    unit = min(mean_edge(scene.bodies[k].mesh) for k in (1, 2))
+    frames = np.repeat(x[None], task.frames + 1, axis=0)
+    frames[:, top, 2] -= frames[0, top, 2].min() - frames[0, ball, 2].max()
+    frames[:, top, 2] += unit * np.broadcast_to(heights, task.frames + 1)[:, None]
+    motion = Motion(frames, np.zeros_like(frames), "neo-hookean", 1.0, 0.0, 1)
+    return tuple(partial(panel.error, task, motion) for panel in panels)
 
 
 def distance_of(scene, *pair) -> float:
-    from charting.distance import distance
+    from chart.distance import distance
 
     one, two = (scene.bodies[k] for k in pair)
     return distance(one.x, one.mesh.surface, two.x, two.mesh.surface)
@@ -222,65 +209,73 @@ def distance_of(scene, *pair) -> float:
 
 def test_a_margin_is_an_error_like_an_overlap():
     for height in (0.1, -0.02):
-        panel, motion = held(height)
+        apart, overlap, _ = held(height)
         # Overlaps are measured in float32, on coordinates of ten edges.
-        assert panel.error(panel, motion) == pytest.approx(abs(height), abs=1e-5)
-        overlap, _ = panel.also
-        assert overlap.error(overlap, motion) == pytest.approx(max(-height, 0.0), abs=1e-5)
+        assert apart() == pytest.approx(abs(height), abs=1e-5)
+        assert overlap() == pytest.approx(max(-height, 0.0), abs=1e-5)
 
 
 def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
-    from charting import ours, paper
-    from charting.methods import Own
+    from chart import scenes
+    from engines import ours
+    from engines.settings import DEFAULT
+    from verification.setup import mean_edge
 
-    panel = paper.scene("squeezed_sphere", True)
-    setting = Own("default", "balanced")
-    motion = ours.run(panel, setting, None, np.inf)
-    shown = panel.also[1]
+    task, (*_, panel) = scenes.scene("squeezed_sphere", True)
+    motion = ours.run(task, DEFAULT, None, np.inf)
     # 0.0016 was seen; another machine may round other contacts into being.
-    assert 0.0 < shown.error(shown, motion) < 0.01
-    edges = [paper.edge(body.mesh) for body in panel.scene().bodies]
+    assert 0.0 < panel.error(task, motion) < 0.01
+    edges = [mean_edge(body.mesh) for body in task.scene().bodies]
     shift = np.array([0.0, 0.1 * np.mean(edges), 0.0])
-    there = replace(motion, x=paper.converged(shown) + shift)
+    there = replace(motion, x=scenes.converged(task) + shift)
     # Positions are kept in float32, of bodies ten edges wide.
-    assert shown.error(shown, there) == pytest.approx(0.1, abs=1e-5)
+    assert panel.error(task, there) == pytest.approx(0.1, abs=1e-5)
 
 
 @pytest.mark.parametrize("name", ["squeezed_sphere", "cubes_on_membrane"])
 def test_the_converged_motion_hardly_changes_with_half_the_steps(name):
-    from charting import paper
+    from chart import scenes
 
-    panel = paper.scene(name, True).also[1]
-    half = paper.converged(panel, paper.CONVERGED // 2)
-    change = paper.rms_distance(panel, paper.converged(panel), half)
+    task, _ = scenes.scene(name, True)
+    half = scenes.converged(task, scenes.CONVERGED // 2)
+    change = scenes.rms_distance(task, scenes.converged(task), half)
     print(change)
     # 1.1e-4 and 0.7e-4 were seen; the figures that it is to judge begin at 1.6e-3.
     assert 0.0 < change < 5e-4
 
 
 def test_bodies_that_went_through_each_other_are_a_failure():
-    from charting.panel import Failed
+    from engines.task import Failed
 
-    panel, motion = held(1.1)
-    for shown in (panel, *panel.also):
+    for error in held(1.1):
         with pytest.raises(Failed, match=r"apart \(1\.1 edges\)"):
-            shown.error(shown, motion)
+            error()
 
 
 def test_a_hop_is_no_gap_and_one_that_stays_is():
     hop = np.zeros(31)
     hop[-3:] = 0.1
-    panel, motion = held(hop)
     # Rounding of coordinates of 0.3 m; overlaps are measured in float32.
-    assert panel.error(panel, motion) == pytest.approx(0.0, abs=1e-5)
+    assert held(hop)[0]() == pytest.approx(0.0, abs=1e-5)
     hop[-6:] = 0.1
-    panel, motion = held(hop)
-    assert panel.error(panel, motion) == pytest.approx(0.1, abs=1e-5)
+    assert held(hop)[0]() == pytest.approx(0.1, abs=1e-5)
 
 
 def test_every_pair_that_presses_is_in_its_scene():
-    from charting import paper
+    from chart import scenes
 
-    for name, pairs in paper.PRESSED.items():
-        labels = {body.label for body in paper.scene(name, True).scene().bodies}
+    for name, pairs in scenes.PRESSED.items():
+        labels = {body.label for body in scenes.scene(name, True)[0].scene().bodies}
         assert {label for pair in pairs for label in pair} == labels
+
+
+def test_the_kept_table_is_drawn_without_a_run(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    import pareto
+
+    table = tmp_path / "pareto.csv"
+    shutil.copy(Path(TOOLS) / "results" / "pareto" / "pareto.csv", table)
+    monkeypatch.setattr(pareto, "runs", None)
+    monkeypatch.setattr("sys.argv", ["pareto.py", "--draw", str(table)])
+    assert pareto.main() == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"pareto.csv", "pareto.png", "summary.png"}

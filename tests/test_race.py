@@ -25,15 +25,14 @@ def blocks() -> wc.Scene:
 
 def test_overlap_and_inverted_tets_are_counted():
     import race
-    from charting.panel import Motion, Panel
+    from engines.task import Motion, Task
 
-    panel = Panel("blocks", "", blocks, 60, 2, lambda *_: 0.0, 1.0)
     x = np.concatenate([body.x for body in blocks().bodies])
     deep, flat = x.copy(), x.copy()
     deep[8:, 2] -= 0.02  # the upper block, into the lower one
     flat[:8, 2] *= -1.0  # the lower block upside down, below the upper one
     motion = Motion(np.array([x, deep, flat]), np.zeros((3, 16, 3)), "neo-hookean", 1.0, 0.0, 3)
-    deepest, last, inverted = race.look(panel, motion)
+    deepest, last, inverted = race.look(Task(blocks, 60, 2), motion)
     finer = wc.box(0.06, 1)
     edge = np.linalg.norm(np.diff(finer.vertices[finer.edges], axis=1), axis=2).mean()
     assert deepest == pytest.approx(0.02 / edge, rel=1e-5)  # float32
@@ -43,10 +42,10 @@ def test_overlap_and_inverted_tets_are_counted():
 
 def test_a_run_without_a_motion_gives_its_reason_and_time():
     import race
-    from charting.panel import Failed, Panel
+    from engines.task import Failed, Task
 
-    panel = Panel("blocks", "", blocks, 60, 2, lambda *_: 0.0, 1.0)
-    line = race.row(panel, "engine", Failed("too slow: 3 of 60 frames in 20 s", 412.3))
+    task = Task(blocks, 60, 2)
+    line = race.row("blocks", task, "engine", Failed("too slow: 3 of 60 frames in 20 s", 412.3))
     assert line.split()[:3] == ["blocks", "engine", "412"]
     assert line.endswith("too slow: 3 of 60 frames in 20 s")
 
@@ -62,11 +61,11 @@ def test_every_scene_of_the_race_can_be_built():
 
 def test_every_setting_has_a_value_for_each_knob():
     import race
-    from charting import methods
+    from engines import outside, settings
 
     for engine, rows in race.SETTINGS.items():
-        assert all(len(row) == len(methods.SWEEPS[engine][0]) for row in rows)
-    for engine in methods.PEERS:
-        quick, full = (methods.outside(engine, q) for q in (True, False))
-        assert quick == full[: methods.FEW] and len(full) == 10
+        assert all(len(row) == len(settings.SWEEPS[engine][0]) for row in rows)
+    for engine in outside.ADAPTERS:
+        quick, full = (settings.outside(engine, q) for q in (True, False))
+        assert quick == full[: settings.FEW] and len(full) == 10
         assert len({tuple(setting.values()) for setting in full}) == 10

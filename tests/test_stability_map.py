@@ -9,9 +9,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
-from stable import chart, outcome, paper, ratios, sweeps
-from stable.outcome import classify
-from stable.setup import METHODS, attempt
+from trials import loads, maps, outcome, sweeps
+from trials.outcome import classify
+from trials.watch import METHODS, attempt
 
 CELLS = {
     "step 3e-4 s, E 1e5": ("step", 3e-4, 1e5),
@@ -33,14 +33,14 @@ def test_a_cell_within_the_frontier_is_fine(name):
 
 
 def test_the_frontier_runs_between_fine_and_other_cells():
-    sides = chart.frontier([["fine", "lost"], ["fine", "fine"]])
+    sides = sweeps.frontier([["fine", "lost"], ["fine", "fine"]])
     assert sides == [((0.5, 0.5), (-0.5, 0.5)), ((0.5, 1.5), (0.5, 0.5))]
 
 
 @pytest.mark.parametrize(("moduli", "want"), [(16.0, outcome.FINE), (40.0, outcome.INVERTED)])
 def test_a_block_carries_16_of_its_moduli_and_not_40_with_a_contact_and_without(moduli, want):
     """What limits the map of ratios at its lower rim is the material."""
-    alone = attempt(partial(ratios.own_weight, moduli))
+    alone = attempt(partial(loads.own_weight, moduli))
     on_another = attempt(partial(sweeps.SWEEPS["ratio"].build, moduli, 1e-4))
     print(alone.volume, on_another.volume)
     assert classify(alone) == classify(on_another) == want
@@ -48,61 +48,26 @@ def test_a_block_carries_16_of_its_moduli_and_not_40_with_a_contact_and_without(
 
 def test_the_line_of_a_limit_ends_at_the_rim_of_the_map():
     s = sweeps.SWEEPS["ratio"]
-    i, j = chart.limit_line(s, *s.axes(False))
+    i, j = sweeps.limit_line(s, *s.axes(False))
     # Mass ratios 10^0, 10^0.4, ... against stiffness ratios 10^-4, 10^-3.2, ...: from 10^1.2 on.
-    assert i == [3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0]
-    np.testing.assert_allclose(j, (0.4 * np.array(i) - np.log10(25.0)) / 0.8)
-
-
-@pytest.mark.parametrize("sweep", sweeps.SWEEPS)
-def test_every_scene_of_the_paper_has_a_place_in_every_map(sweep):
-    s = sweeps.SWEEPS[sweep]
-    found = paper.marks(sweep, s.build(s.x[0], s.y[0]).scene)
-    assert {figure for figure, _, _ in found} == {1, 6, 7, 8, 9, 10}
-    assert np.isfinite([place for _, *place in found]).all()
-
-
-def test_a_scene_is_marked_with_what_its_file_says():
-    cell = sweeps.SWEEPS["depth"].build(0.1, 0.1).scene
-    found = paper.marks("depth", cell)
-    np.testing.assert_allclose([p for figure, *p in found if figure == 6], [[0.1, 1.0]])
-    found = [p for figure, *p in paper.marks("ratio", cell) if figure == 6]
-    np.testing.assert_allclose(found, [[1.0, 1.0], [1.0, 10.0]])
-
-
-def test_a_mark_lies_between_the_cells_of_its_value(rng):
-    values = np.geomspace(*np.sort(rng.uniform(1e-3, 1e3, 2)), 7)
-    for k, value in enumerate(values):
-        np.testing.assert_allclose(chart.place(value, values)[0], k, atol=1e-9)
-    half = np.sqrt(values[2] * values[3])
-    np.testing.assert_allclose(chart.place(half, values)[0], 2.5)
-    step = values[1] / values[0]
-    assert chart.place(values[-1] * step, values) == (6.5, True)
-    assert chart.place(0.0, values) == (-0.5, True)
-
-
-def test_scenes_in_one_place_share_a_mark():
-    xs = ys = np.geomspace(1.0, 1e4, 5)
-    scenes = [(1, 10.0, 10.0), (6, 10.0, 10.5), (6, 10.0, 11.0), (7, 1e3, 1e9)]
-    found = chart.labels(scenes, xs, ys)
-    assert list(found.values()) == [("1, 6", "white"), ("7", "lightgrey")]
+    np.testing.assert_array_equal(i, np.arange(3, 11))
+    np.testing.assert_allclose(j, (0.4 * i - np.log10(25.0)) / 0.8)
 
 
 def test_the_map_writes_a_row_per_cell_and_a_picture(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
-    monkeypatch.setattr(chart, "METHODS", METHODS[:2])
+    monkeypatch.setattr(maps, "METHODS", METHODS[:2])
     monkeypatch.setattr(sweeps, "COARSE", 2)
-    monkeypatch.setitem(chart.SWEEPS, "small", sweeps.SWEEPS["speed"])
-    monkeypatch.setitem(paper.PLACES, "small", paper.speed_step)
-    assert chart.draw(["small"], True, tmp_path) == 0
+    assert maps.draw(["speed"], True, tmp_path) == 0
     rows = (tmp_path / "map.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * 4
-    assert (tmp_path / "small.png").stat().st_size > 1000
+    assert (tmp_path / "speed.png").stat().st_size > 1000
 
 
 def test_without_matplotlib_the_map_says_so(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert chart.draw(["speed"], True, tmp_path / "map") == 1
+    monkeypatch.delitem(sys.modules, "trials.picture", raising=False)
+    assert maps.draw(["speed"], True, tmp_path / "map") == 1
     assert capsys.readouterr().err.count("\n") == 1
 
 

@@ -5,7 +5,7 @@
 
 Each case runs in a process of its own until there are contacts, then the same few steps again and
 again (a window, begun from the same state each time): as one captured graph, and uncaptured with a
-timer around every operation (``benching/stages.py``). Times are medians over the repeats, averaged
+timer around every operation (``clock/timer.py``). Times are medians over the repeats, averaged
 over the steps of the window; all are those of one step. On the CPU they are times of the thread,
 so that other processes on the machine hardly count; those of frames and starts are wall times.
 
@@ -18,8 +18,8 @@ so that other processes on the machine hardly count; those of frames and starts 
     step.overhead_us_per_launch  what the captured step takes beyond that, for each operation
     step.overhead_us           the same for the step
     step.of_bound              step.ms over 90 ns a tet, 150 ns a surface vertex, 1 us a contact
-    STAGE.launches, .ms        of a stage: damping, predict (and drift), candidates,
-                               vertex_contacts, edge_contacts, impulses, closure
+    STAGE.launches, .ms        of a stage: what a module of ``warp_contact/step`` launches itself;
+                               ``step_alone`` is ``step.py``
     STAGE.bytes                of the arrays given to its operations, those of a launch once: what
                                moving each once would be; a list counts with all its room
     STAGE.share                of the sum of all operations
@@ -39,19 +39,16 @@ import of the package; ``warm_frame_s`` and ``cold_frame_s`` are the first frame
 included, with the kernels compiled before and with an empty kernel cache.
 """
 
-import argparse
 import multiprocessing
 import sys
-from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
-import warp as wp
-from benching.cases import FRACTION, cases
-from benching.figures import figures, log_slope
-from benching.machine import write
-from benching.options import count
-from benching.start import start_times
+from clock.figures import figures, log_slope, start_times
+from clock.scenes import FRACTION, Case, cases
+from measure import report
+from measure.figure import Figure
+from measure.run import command_line, count
 
 START = "start"  # the case of the times until the first frame
 OVERHEAD = "squeezed_sphere"
@@ -59,18 +56,12 @@ OVERHEAD = "squeezed_sphere"
 
 def main() -> int:
     """Run the cases and print their figures as they come."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("cases", nargs="*", metavar="case", help="of those printed; or all")
     parser.add_argument("--quick", action="store_true", help="small cases, few repeats, no compile")
-    parser.add_argument(
-        "--large", action="store_true", help="also a pile of 1e6 vertices, 4096 worlds"
-    )
+    parser.add_argument("--large", action="store_true", help="a pile of 1e6 vertices, 4096 worlds")
     parser.add_argument("--frames", type=count, help="to run before, in place of each case's own")
-    parser.add_argument(
-        "--fraction", type=float, default=FRACTION, help="of the fruits in the bowl"
-    )
+    parser.add_argument("--fraction", type=float, default=FRACTION, help="of the bowl's fruits")
     parser.add_argument("--repeats", type=count, help="of a window; 7, or 3 with --quick")
     parser.add_argument("--device", help="cpu, cuda:0, ...")
     parser.add_argument("--kernels", action="store_true", help="print each operation as well")
@@ -82,50 +73,42 @@ def main() -> int:
     if unknown:
         names = ", ".join([*known, START])
         parser.error(f"no case {', '.join(sorted(unknown))}; there are {names}")
-    wp.config.log_level = wp.LOG_WARNING
+    timed = {name: case for name, case in known.items() if name in chosen}
     found: dict[str, float] = {}
-    timed = [name for name in known if name in chosen]
     repeats = args.repeats or (3 if args.quick else 7)
     run = partial(figures, frames=args.frames, repeats=repeats, device=args.device)
-    with ProcessPoolExecutor(
-        1, multiprocessing.get_context("spawn"), max_tasks_per_child=1
-    ) as pool:
-        for name, result in zip(timed, pool.map(run, map(known.get, timed)), strict=True):
-            show(
-                {f"{name}.{figure}": value for figure, value in result.items()}, found, args.kernels
-            )
-    show(summary(found, {name: known[name].series for name in timed}), found)
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, spawn, max_tasks_per_child=1) as pool:
+        for name, new in zip(timed, pool.map(run, timed.values()), strict=True):
+            found |= show(name, new, args.kernels)
+    found |= show("", summary(found, timed))
     if START in chosen:
-        times = start_times(args.device, cold=not args.quick)
-        show({f"{START}.{figure}": value for figure, value in times.items()}, found)
+        found |= show(START, start_times(args.device, cold=not args.quick))
     if args.out:
-        write(args.out, wp.get_device(args.device), found)
+        report.write(args.out, [Figure("", *figure) for figure in found.items()], args.device)
     return 0
 
 
-def show(new: dict[str, float], found: dict[str, float], kernels: bool = True) -> None:
-    """Print figures and keep them; those of single operations only if ``kernels``."""
-    for name, value in new.items():
+def show(case: str, new: dict[str, float], kernels: bool = True) -> dict[str, float]:
+    """Print the figures of a case and return them; those of operations only if ``kernels``."""
+    found = {f"{case}.{name}".lstrip("."): value for name, value in new.items()}
+    for name, value in found.items():
         if kernels or name.count(".") < 3:
             print(f"{name} {value:.5g}", flush=True)
-    found |= new
+    return found
 
 
-def summary(found: dict[str, float], series: dict[str, str]) -> dict[str, float]:
-    """What takes more than one case, and the launch overhead."""
+def summary(found: dict[str, float], timed: dict[str, Case]) -> dict[str, float]:
+    """The launch overhead, and the exponents of the time of a step over the vertices."""
     new = {}
     if f"{OVERHEAD}.step.ms" in found:
         new["launch_overhead_us"] = found[f"{OVERHEAD}.step.overhead_us_per_launch"]
-    for kind in sorted(set(series.values()) - {""}):
-        names = [name for name, own in series.items() if own == kind]
+    for series in sorted({case.series for case in timed.values()} - {""}):
+        names = [name for name, case in timed.items() if case.series == series]
         if len(names) > 1:
-            new[f"{kind}.slope"] = slope(found, names)
+            of = ([found[f"{n}.{f}"] for n in names] for f in ("vertices", "step.ms"))
+            new[f"{series}.slope"] = log_slope(*of)
     return new
-
-
-def slope(found: dict[str, float], names: Iterable[str]) -> float:
-    """Exponent of the time of a step over the vertices."""
-    return log_slope(*([found[f"{n}.{f}"] for n in names] for f in ("vertices", "step.ms")))
 
 
 if __name__ == "__main__":

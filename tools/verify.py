@@ -7,15 +7,13 @@ best; one with a target is ok within it. A case holds what all of its figures ho
 is 1 when one is missed. No time is measured.
 """
 
-import argparse
 import sys
 from functools import partial
 from importlib import import_module
 
-import warp as wp
 from measure import machine, report
 from measure.figure import Figures, lowest
-from measure.run import one_of, run, status
+from measure.run import command_line, one_of, run, status
 from verification.setup import RESPONSES, Ask
 
 CASES = {  # title, where the figures come from
@@ -40,27 +38,23 @@ CASES = {  # title, where the figures come from
 
 def main() -> int:
     """Run the cases and print their figures as they come."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    known = ", ".join(CASES)
-    parser.add_argument(
-        "cases", nargs="*", metavar="case", type=one_of(CASES), help=f"of {known}; or all"
-    )
+    parser = command_line(__doc__)
+    names = f"of {', '.join(CASES)}; or all"
+    parser.add_argument("cases", nargs="*", metavar="case", type=one_of(CASES), help=names)
     parser.add_argument("--quick", action="store_true", help="fewer variants, coarser meshes")
     parser.add_argument("--response", choices=RESPONSES, default=RESPONSES[0])
     parser.add_argument("--csv", metavar="FILE", help="write the figures there too")
     parser.add_argument("--seed", type=int, default=0, help="of the jittered meshes")
     args = parser.parse_args()
-    wp.config.log_level = wp.LOG_WARNING
-    print(machine.line(), f"response {args.response}, SEED={args.seed}", "", sep="\n")
+    title = f"response {args.response}, SEED={args.seed}"
+    print(machine.line(), title, "", sep="\n")
     print(report.FIGURES.head())
     chosen = [CASES[name] for name in args.cases or CASES]
     ask = Ask(args.quick, args.response, args.seed)
     found = run({title: partial(figures, where, ask) for title, where in chosen})
     print("", *(f"{title}: {lowest(kept)}" for title, kept in found.items()), sep="\n")
     if args.csv:
-        report.write(args.csv, [figure for kept in found.values() for figure in kept])
+        report.write(args.csv, [f for kept in found.values() for f in kept], title=title)
     return status(found)
 
 

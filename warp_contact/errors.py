@@ -2,8 +2,8 @@
 
 
 class SimulationError(RuntimeError):
-    """A run cannot go on, for example because its state is no longer finite."""
+    """A run cannot continue, for example because its state is no longer finite."""
 
 
 class UsageError(ValueError):
-    """The command line asked for something that cannot be."""
+    """The command line asked for something impossible."""

@@ -23,12 +23,12 @@ class Simulation:
 
     Attributes:
         scene: as given
-        response: how bodies answer to an overlap
+        response: how bodies respond to contact
         fps: frames per second
         frame: number of the last finished frame
         model: what stays constant, as Warp arrays
         state: positions [m] and velocities [m/s] as Warp arrays, shape (n_vert,)
-        device: where all of it lives
+        device: where the arrays are
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Simulation:
             substeps: steps in each frame; None takes the stable step of the assembled system,
                 shorter where bodies approach each other fast
             device: ``cpu``, ``cuda:0``, ...; None takes Warp's default
-            sleeping: under gravity, bodies at rest are left alone until something comes near: a
+            sleeping: under gravity, islands at rest are left alone until something comes near: a
                 settled pile costs next to nothing, at an accuracy that ``frame/sleeping.py`` states
 
         Raises:
@@ -120,9 +120,8 @@ class Simulation:
     def set_positions(self, body: Body | int | None, positions, vertices=None) -> None:
         """Put vertices elsewhere between frames, as at the start of an episode.
 
-        No motion leads there, so nothing on the way is met or counted, and velocities stay. What
-        overlaps there is moved apart like what overlaps at the start of a run. Everything that
-        sleeps wakes.
+        This is no motion: nothing on the way is touched or counted, and velocities stay. Overlaps
+        at the new place are moved apart like those at the start of a run. All bodies wake.
 
         Args:
             body: the body; None for all
@@ -180,15 +179,15 @@ class Simulation:
     def contact_fields(self) -> dict[str, np.ndarray]:
         """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
 
-        The partner is a body's index, n_body + p for plane p, -1 for none; it and the penetration
-        are those that the last step looked at last: at the positions that it predicted, where it
-        moved surfaces those after that, and without impulses before the forces those at its start.
-        Contacts of edges that go on from the step before have no penetration. Shapes (n_vert,).
+        The partner is a body's index, n_body + p for plane p, -1 for none. Partner and penetration
+        are those of the last detection pass: at the predicted positions, after the closure where it
+        moved surfaces, at the start of the step for a penalty. Persistent contacts of edges have no
+        penetration. Shapes (n_vert,).
         """
         return contact_fields(self.model, self.state.x, self._stepper.work, 1.0 / self.fps)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write a checkpoint: a run that goes on from it gives the bits of one never interrupted.
+        """Write a checkpoint: a run that continues from it gives the bits of one never interrupted.
 
         The scene is not in it: build it anew, make a ``Simulation`` of it with the same settings,
         and ``load`` the file. Velocities given to fixed vertices are part of it.
@@ -200,7 +199,7 @@ class Simulation:
         checkpoint.write(path, self._fingerprint(), values)
 
     def load(self, path: str | os.PathLike) -> None:
-        """Go on from a checkpoint; until the next frame, only bodies asleep have contact forces.
+        """Continue from a checkpoint; until the next frame only bodies asleep have contact forces.
 
         Raises:
             OSError: it cannot be read

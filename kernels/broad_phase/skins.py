@@ -1,24 +1,24 @@
-"""Broad phase: pairs that hold while nothing moves further than a skin (Verlet 1967).
+"""Stage 2, broad phase: pairs that hold while nothing moves further than a skin (Verlet 1967).
 
 Pairs are found at the positions of some step and kept for many steps. As long as no vertex is
-further from there than the skin of its body, all contacts are among them. Each step tests them
-exactly, so it finds the same contacts as with new pairs. They are found again once the predicted
+further from there than the skin of its body, the pairs include all contacts. Each step tests them
+exactly, so it finds the same contacts as with new pairs. New pairs are found once the predicted
 position of a vertex is further away than ``free``. The rest of the skin is a reserve for what
 impulses and the closure add within a step: they may stop the body, and its neighbours may push it.
-They are also found again when a body moves further than FASTER reserves in a step.
+New pairs are also found when a body moves further than FASTER reserves in a step.
 
     free    = max(looks d, LEAST_SKIN e / 2) + D / 2     [m]
     reserve = max(d, LEAST_SKIN e / 2) + D / 2           [m]     skin = free + reserve
 
 d is the largest motion of the body in a step, D that of the bodies near it, e the shortest edge.
-``looks`` is for how many steps the pairs should last. It is the same for all bodies, and such that
-looks d is MEAN_SKIN edges on average. A few fast bodies then do not use up the pairs of a pile at
-rest, and skins stay narrow where all bodies are fast. A vibrating body stays near its place, so its
-pairs last several times longer. A body with nothing near it, even with LONGEST for all, gets that.
+``looks`` is the number of steps that the pairs should last. It is the same for all bodies, and such
+that looks d is MEAN_SKIN edges on average. A few fast bodies then do not use up the pairs of a pile
+at rest, and skins stay narrow where all bodies are fast. A vibrating body stays near its place, so
+its pairs last longer. A body with nothing near it, even with LONGEST for all, gets LONGEST.
 
-Most pairs are not close to touching. Where a pair is some distance apart, it is left alone until
-its two bodies together have travelled that distance. The distance travelled by a body is the sum of
-its largest motions from one detection pass to the next.
+Most pairs are not close to touching. A pair that is some distance apart is left alone until its two
+bodies together have travelled that distance. A body travels the sum of its largest motions from one
+detection pass to the next.
 """
 
 import warp as wp

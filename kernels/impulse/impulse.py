@@ -13,7 +13,7 @@ Each contact sees the share m_k / N_k of a vertex, so a plain sweep cannot add k
 momentum is kept exactly. A fixed vertex has 1 / m = 0 and keeps its prescribed velocity.
 
 Sweep j starts from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
-method, except at contacts where that change was too large. The last sweep is a plain one. Most
+method, except at contacts where that change went too far. The last sweep is a plain one. Most
 contacts converge soon, a few clusters late. Between the first and the last sweep a contact is left
 alone while neither its impulses nor the velocities of its vertices change.
 """

@@ -15,7 +15,7 @@ one, may take more of the torque than of the impulse. Therefore the inverse effe
 Across a gap that is too wide for the surface to take the torque there is no friction in this step.
 
 Where a vertex meets a facet, n is the direction of the depth. It is smooth over many facets, and
-the facet may lean away from it: a ramp. A vertex that slides up a ramp goes into the facet although
+the facet may lean away from it, as a ramp. A vertex that slides up it enters the facet although
 u . n = 0. The closure lifts it out, which would add energy. The facet itself would push along its
 normal n_f, at x0. So the tangential impulse may point down the ramp as well,
 

@@ -1,4 +1,4 @@
-"""Motion of the vertices: corner forces gathered, symplectic Euler, damping.
+"""Stage 1, predict: corner forces gathered, symplectic Euler, damping.
 
     f_i = sum of f_tet over the corners at vertex i        [N]
     v'  = v + h (f / m + g)                                [m/s]
@@ -127,7 +127,7 @@ def count_down(
     # in, out
     steps: wp.array[int],  # (1,) steps that the frame still has: none when it has to be repeated
 ):
-    """One thread, at the end of a step."""
+    """One thread, at the end of a step: count it down."""
     steps[0] = steps[0] - 1
     for k in range(needed.shape[0]):
         if needed[k] > 0:

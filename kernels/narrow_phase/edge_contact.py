@@ -17,7 +17,7 @@ bodies were apart then: the lines have passed each other.
 
 With one end inside, the triangle closest to that end stands for t2, or t1. Only a ridge makes a
 contact then: the vertex has one of its own, but where two rims cross that lies beside the overlap.
-It is dropped if it would have overlapped before: the edge touches a corner from the side.
+The ridge is dropped if it would have overlapped before: the edge touches a corner from the side.
 
 In any case a contact must push against a face of its edge (opposing.py).
 """
@@ -69,7 +69,7 @@ def shared_edge(s: wp.vec3i, t: wp.vec3i) -> wp.vec2i:
 @wp.struct
 class EdgeContact:
     found: bool
-    t: float  # place on pq
+    t: float  # parameter along pq
     n: wp.vec3
     d: float  # [m]
     vert: wp.vec3i  # of N

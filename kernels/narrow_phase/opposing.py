@@ -16,8 +16,8 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-LEAN = wp.constant(0.1)  # cosine: faces opposed by more than this oppose each other
-ALONG = wp.constant(0.7)  # cosine: faces aligned by more than this point the same way
+LEAN = wp.constant(0.1)  # cosine: beyond it, two faces point against each other
+ALONG = wp.constant(0.7)  # cosine: beyond it, two faces point the same way
 
 
 @wp.func

@@ -24,9 +24,7 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-OBLIQUE = wp.constant(
-    0.1
-)  # cosine: a ray that runs along the wall where it starts leaves elsewhere
+OBLIQUE = wp.constant(0.1)  # cosine: a ray along a wall in which it starts does not leave by it
 CREASE = wp.constant(0.6)  # cosine: edges sharper than 53 degrees keep their face normals
 
 
@@ -222,7 +220,7 @@ def closest_hit(
 @wp.func
 def corner_normal(
     i: int,
-    face: wp.vec3,  # area vector of the triangle that asks [m^2]
+    face: wp.vec3,  # area vector of the triangle itself [m^2]
     tris: wp.array[wp.vec3i],
     vs_start: wp.array[int],
     vs_tri: wp.array[int],

@@ -2,10 +2,10 @@
 
 The contact point is where the ray from the vertex along its direction leaves the body (Spillmann &
 Teschner 2005, section 3.2). The distance to it replaces the depth. In two cases the closest point
-of the surface serves instead. Either there is no direction, or the ray is much longer than the
-depth. Or bodies were apart when the step began, but the contact would have overlapped then, and
-that of the closest point less: the vertex came in by another side. If the latter would have
-overlapped too, close to a rim, the vertex goes back through the triangle by which it came in.
+of the surface serves instead. First, if there is no direction, or the ray is much longer than the
+depth. Second, if bodies were apart when the step began, but this contact would have overlapped
+then, and that of the closest point less: the vertex came in by another side. If the latter would
+have overlapped too, close to a rim, the vertex goes back through the triangle by which it came in.
 
 A vertex outside, in the speculative margin, makes a contact with a gap. The impulses then see it
 before it closes, so that a resting body stays in contact in every step and its contact force is
@@ -37,9 +37,9 @@ from warp_contact.kernels.options import OPTIONS
 wp.set_module_options(OPTIONS)
 
 SLIP = wp.constant(1.0)  # change of the weights in a step, above which those at its end are used
-BESIDE = wp.constant(0.1)  # weights: further away, a ray from inside is none of the vertex outside
+BESIDE = wp.constant(0.1)  # weights: a ray from just inside must leave this close to the vertex
 TRUSTED = wp.constant(3.0)  # a ray this many times longer than the depth is not trusted
-ASTRAY = wp.constant(2.0)  # nor a way back this many times longer than the motion in the step
+ASTRAY = wp.constant(2.0)  # nor is a way back this many times longer than the motion in the step
 
 
 @wp.struct

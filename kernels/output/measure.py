@@ -1,4 +1,4 @@
-"""Overlaps that are left, found without the hash and the depths of the step.
+"""The overlaps of a state, found without the hash and the depths of the step.
 
 A vertex overlaps by its distance to the surface of the body whose tets contain it. An edge with
 both ends outside overlaps by the distance of the middle of its inner piece to that surface.
@@ -24,7 +24,7 @@ def tet_boxes(
     lower: wp.array[wp.vec3],  # (n_tet,) [m]
     upper: wp.array[wp.vec3],  # (n_tet,) [m]
 ):
-    """One thread per tet."""
+    """One thread per tet: its box."""
     q = wp.tid()
     a = x[tets[q][0]]
     b = x[tets[q][1]]

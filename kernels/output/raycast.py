@@ -2,7 +2,7 @@
 
     L = c (E_sun V max(n . l, 0) + E_sky(n) A) + s V      radiance of a body, colour c
     V: share of the sun's disc that is visible            rays over the disc
-    A: share of the sky that is visible                   cosine-weighted rays; what hides it glows
+    A: share of the sky that is visible                   cosine-weighted rays; occluders glow
     s: highlight of a rough coat (Blinn 1977)
 
 Secondary rays start on a curved surface through the vertex normals, not on the facet (Hanika 2021,
@@ -16,7 +16,7 @@ from warp_contact.kernels.options import OPTIONS
 wp.set_module_options(OPTIONS)
 
 FAR = wp.constant(1.0e30)
-GLOW = wp.constant(0.3)  # light from what hides the sky, as a share of that from below [-]
+GLOW = wp.constant(0.3)  # light from what occludes the sky, as a share of that from below [-]
 GOLDEN = wp.constant(0.6180339887498949)
 
 
@@ -35,7 +35,7 @@ class View:
 
 @wp.struct
 class Light:
-    mesh: wp.uint64  # what stands in its way
+    mesh: wp.uint64  # the triangles that occlude it
     sun: wp.vec3  # unit, toward the sun [-]
     sun_power: float  # [-]
     sun_size: float  # tangent of the half angle of its disc [-]

@@ -58,7 +58,7 @@ def touching_tets(
     tets: wp.array[wp.vec4i],  # (n_tet,)
     s: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
-    mask: wp.array[int],  # (n_tet,) 1 for a tet with a displacement vertex
+    mask: wp.array[int],  # (n_tet,) 1 for a tet with a vertex of the region
 ):
     """One thread per tet: whether its forces change during the search."""
     q = wp.tid()

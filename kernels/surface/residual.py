@@ -1,8 +1,8 @@
 """Residual overlaps after the impulses, and vertices that left their triangle or lie below it.
 
 The gap of a vertex is that to a point of its triangle, along a direction that may not be the normal
-of the triangle. A vertex that has slid may therefore overlap this or another triangle although its
-gap is closed.
+of the triangle. A vertex that has slid may therefore overlap this or another triangle although this
+gap shows no overlap.
 """
 
 import warp as wp

@@ -18,11 +18,11 @@ their disagreement leaves no gap or overlap. k is the stiffness of a side that m
 vertex alone is several times stiffer, so only the part c of an imbalance is corrected at a time.
 
     literal    P_own = f / A, P_other = sum w_i f_i / (A sum w_i) with f = -F . s^ (eq. 2 as
-               printed: A is the same on both sides of the comparison and falls out of it), and
+               printed: A is the same on both sides of the comparison and cancels), and
                a <- a +- 2^-(k + 2), k = 0, 1, ...: bisection from 1/2 on. P_other has the own
                triangle blended in as above, and pulling forces count as zero
 
-A side whose vertices are all fixed is rigid: the other side goes all the way.
+A side whose vertices are all fixed is rigid: the other side moves by all of s.
 """
 
 import warp as wp
@@ -111,7 +111,7 @@ def stiffnesses(
     # out
     stiffness: wp.array[float],  # (n_vert,) [Pa] traction gained over the whole of s
 ):
-    """One thread per vertex of the region."""
+    """One thread per vertex of the region: the stiffness of its side along s."""
     i = wp.tid()
     if wp.length_sq(s[i]) > 0.0:
         stiffness[i] = 2.0 * wp.max(half[i] - before[i], 0.0)
@@ -238,7 +238,7 @@ def meet(
     # in, out
     fraction: wp.array[float],  # (n_vert,)
 ):
-    """One thread per vertex of the region: half way to what the other side leaves it."""
+    """One thread per vertex of the region: half way to the fraction left by the other side."""
     i = wp.tid()
     if wp.length_sq(s[i]) == 0.0:
         return

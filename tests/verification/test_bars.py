@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from verification import bars, chain, orders
+from verification import bars, orders
 
 
 @pytest.mark.parametrize("name", bars.IMPACTS)
@@ -46,7 +46,7 @@ def test_unequal_bars_of_many_elements_part_as_the_waves_say(name, ask, hold):
 def test_exact_contact_wants_vertices_that_face_each_other():
     scene, _ = bars.build(bars.IMPACTS["identical"], 10, (2, 3))
     with pytest.raises(ValueError, match="face each other"):
-        chain.collide(scene, 1e-3, [1])
+        bars.collide(scene, 1e-3, [1])
 
 
 def test_the_impact_converges_with_step_and_elements(ask, hold):

@@ -49,8 +49,11 @@ def number(value: float | None) -> str:
     return "" if value is None else f"{value:.4g}"
 
 
-def write(path: str | Path, figures: Sequence[Figure], device: str | None = None) -> None:
-    """Write all figures and where they come from as CSV or JSON, by the ending of ``path``."""
+def write(path: str | Path, figures: Sequence[Figure], device=None, title: str = "") -> None:
+    """Write all figures and where they come from as CSV or JSON, by the ending of ``path``.
+
+    A table of CSV has its ``title`` beside the machine.
+    """
     if Path(path).suffix == ".json":
         values = {f"{f.case}.{f.name}".lstrip("."): f.value for f in figures}
         text = json.dumps(machine.about(device) | {"figures": values}, indent=1)
@@ -58,7 +61,7 @@ def write(path: str | Path, figures: Sequence[Figure], device: str | None = None
         return
     names = [field.name for field in fields(figures[0])]
     with open(path, "w", newline="", encoding="utf-8") as file:
-        file.write(f"# {machine.line(device)}\n")
+        file.write(f"# {machine.line(device)}; {title}\n")
         out = csv.writer(file)
         out.writerow([*names, "level"])
         out.writerows([*(getattr(f, name) for name in names), f.level] for f in figures)

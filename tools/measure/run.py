@@ -3,6 +3,8 @@
 import argparse
 from collections.abc import Callable, Collection, Iterable, Mapping
 
+import warp as wp
+
 from measure import report
 from measure.figure import MISSED, Figure, Figures, lowest
 from warp_contact import SimulationError
@@ -35,6 +37,13 @@ def guarded(name: str, case: Case) -> Figures:
 def status(found: Mapping[str, Iterable[Figure]]) -> int:
     """The exit status of a tool: 1 when any figure is missed."""
     return int(any(lowest(figures) == MISSED for figures in found.values()))
+
+
+def command_line(doc: str) -> argparse.ArgumentParser:
+    """The parser of the command line of a tool, described by ``doc``; Warp only warns then."""
+    wp.config.log_level = wp.LOG_WARNING
+    raw = argparse.RawDescriptionHelpFormatter
+    return argparse.ArgumentParser(description=doc, formatter_class=raw)
 
 
 def one_of(known: Collection[str]) -> Callable[[str], str]:

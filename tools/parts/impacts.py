@@ -3,8 +3,8 @@
 from functools import partial
 
 import numpy as np
-from stable import limits, tilts
-from stable.setup import attempt
+from trials import figures, limits
+from trials.watch import attempt
 from verification import collision
 
 import warp_contact as wc
@@ -66,7 +66,7 @@ def gained(build) -> dict[str, float]:
 
 def bent() -> dict[str, float]:
     """Corner that slides up a bent face."""
-    return gained(partial(tilts.collide, 47))
+    return gained(partial(figures.collide, 47))
 
 
 def seam() -> dict[str, float]:

@@ -5,8 +5,8 @@ from functools import partial
 from unittest import mock
 
 import warp as wp
-from stable import ratios, sweeps
-from stable.setup import attempt
+from trials import loads, sweeps
+from trials.watch import attempt
 from verification import surface as stage_4
 from verification import weight as static
 from verification.setup import Ask
@@ -47,13 +47,13 @@ def inserted() -> dict[str, float]:
 
 def dense() -> dict[str, float]:
     """Cube on a cube of a 10000th of its density."""
-    case = next(c for c in ratios.cases(False) if "1:10000, heavy" in c.name)
+    case = next(c for c in loads.ratios(False) if "1:10000, heavy" in c.name)
     return {GAINED: max(attempt(case.build, "surface", limit=case.limit).gained, 0.0)}
 
 
 def crushed() -> dict[str, float]:
     """Cube struck by one of 10^4 times its mass."""
-    setting = ratios.heavy(0.1, 5.0)
+    setting = loads.heavy(0.1, 5.0)
     sim = wc.Simulation(setting.scene, fps=setting.fps)
     start = sim.measure().energy
     frames = round(setting.seconds * setting.fps)

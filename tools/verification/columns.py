@@ -59,15 +59,15 @@ class Pile:
     gravity: float = 0.0
     friction: float = 0.0
 
-    def build(self) -> wc.Scene:
-        """The rest shapes."""
+    def build(self, law=wc.Corotated) -> wc.Scene:
+        """The rest shapes, of a material of that law."""
         scene = wc.Scene(self.pose.out((0.0, 0.0, -self.gravity)), self.friction)
         foot = self.base
         for c in self.columns:
             mesh = block((*c.section, c.length), c.cells, c.mesh, c.seed)
             held = on_face(mesh, 2, -1) & (c is self.columns[0])
             held |= on_face(mesh, 2, 1) & (self.clamped and c is self.columns[-1])
-            material = wc.Corotated(c.young, 0.0, c.density, c.damping)
+            material = law(c.young, 0.0, c.density, c.damping)
             place = self.pose.out((0.0, 0.0, foot + 0.5 * c.length))
             scene.add_body(mesh, material, place, self.pose.q, fixed=held)
             foot += c.length + self.gap

@@ -35,7 +35,8 @@ def run(ask: Ask) -> Figures:
 
 def build(material) -> wc.Scene:
     """A bar along x, held at its lower end."""
-    scene, mesh = wc.Scene(gravity=(0.0, 0.0, 0.0)), wc.box(SIZE, CELLS)
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+    mesh = wc.box(SIZE, CELLS)
     scene.add_body(mesh, material, fixed=on_face(mesh, 0, -1))
     return scene
 

@@ -241,10 +241,12 @@ def line_on_plane(ask: Ask, n: int, pose: Pose) -> Figures:
     b, _ = line_contact(LINE_LOAD, RADIUS, E_STAR)
     # About the force asked for (Johnson 1985, sec. 5.6, nu = 0).
     depth = LINE_LOAD / (np.pi * E_STAR) * 2.0 * np.log(2.0 * SLICE_HEIGHT / b)
-    mesh, material = slab(FIT * b / n, COLUMNS[n]), wc.Corotated(E_STAR, 0.0, DENSITY)
+    mesh = slab(FIT * b / n, COLUMNS[n])
+    material = wc.Corotated(E_STAR, 0.0, DENSITY)
     sim, p = squeeze(ask, [(mesh, material, ORIGIN, pose.q)], FIT * b / n, depth, pose)
     rows = by_row(mesh, p * vertex_areas(sim), pose.back(sim.positions())[:, 0])
-    label, names = f"A3 cylinder on plane, N = {n} {pose}", ("force [N/m]", "half-width")
+    label = f"A3 cylinder on plane, N = {n} {pose}"
+    names = "force [N/m]", "half-width"
     yield from profile(label, names, rows, (line_contact, RADIUS, E_STAR), 4.0, n)
 
 

@@ -92,7 +92,10 @@ def sliding(ask: Ask) -> Figures:
     scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
     x = friction.begin(ask, scene).positions()
     start = scene, ask.respond(*friction.PENALTY), FPS
-    place = lambda sim: friction.centre(sim)[0, :1]  # noqa: E731
+
+    def place(sim: wc.Simulation) -> np.ndarray:
+        return friction.centre(sim)[0, :1]
+
     yield in_steps("A8 sliding block", "order of the place in dt", start, x, SLIDES, place)
 
 
@@ -107,8 +110,12 @@ def resting(ask: Ask) -> Figures:
     for _ in relax(at_rest, omega, round(14.0 / omega * fps)):
         pass
     rate = 10.0 * WAVE / LENGTH
-    start, x = (standing(1.0), ask.respond(ON_PLANE), rate), at_rest.positions()
-    state = lambda sim: np.append(sim.positions(), sim.velocities() * LENGTH / WAVE)  # noqa: E731
+    start = standing(1.0), ask.respond(ON_PLANE), rate
+    x = at_rest.positions()
+
+    def state(sim: wc.Simulation) -> np.ndarray:
+        return np.append(sim.positions(), sim.velocities() * LENGTH / WAVE)
+
     yield in_steps("A8 resting bar", "order of the state in dt", start, x, WAIT / rate, state)
 
 

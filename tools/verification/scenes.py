@@ -38,7 +38,8 @@ def bowl(ask: Ask) -> Figures:
 def play(name: str, scene: wc.Scene, response, frames: int, substeps=None) -> Figures:
     """Run a scene: what counts for every one, then what its picture shows."""
     sim = wc.Simulation(scene, response, fps=FPS, substeps=substeps)
-    measured, error = [sim.measure()], ""
+    measured = [sim.measure()]
+    error = ""
     try:
         measured += (sim.measure() for _ in sim.frames(frames))
     except SimulationError as stop:
@@ -94,7 +95,8 @@ CARRIED = {  # who carries whom, by their order in the scene; elsewhere the firs
 
 def fallen(name: str, sim: wc.Simulation) -> list[str]:
     """The bodies whose centre is below a floor, or below the surface that carries them."""
-    bodies, floors = sim.scene.bodies, [(n, h) for n, h in sim.scene.planes if n[2] > 0.5]
+    bodies = sim.scene.bodies
+    floors = [(n, h) for n, h in sim.scene.planes if n[2] > 0.5]
     at = [sim.positions(body).mean(axis=0) for body in bodies]
     lost = {k for k, x in enumerate(at) if any(x @ n < h for n, h in floors)}
     for k, upper in CARRIED.get(name) or ((0, k) for k in range(1, len(bodies))):
@@ -110,7 +112,8 @@ def fallen(name: str, sim: wc.Simulation) -> list[str]:
 def sink_depths(sim: wc.Simulation, measured: list[wc.Measure]) -> dict[str, float]:
     """How far the bottoms of the cubes are below the membrane."""
     sheet, *cubes = sim.scene.bodies
-    top, x = facing(sheet.x, sheet.mesh.surface, 1.0), sim.positions(sheet)
+    top = facing(sheet.x, sheet.mesh.surface, 1.0)
+    x = sim.positions(sheet)
     figures = {}
     for cube in cubes:
         foot = sim.positions(cube)[np.unique(facing(cube.x, cube.mesh.surface, -1.0))]

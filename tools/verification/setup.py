@@ -87,6 +87,12 @@ def on_face(mesh: wc.TetMesh, axis: int, side: int) -> np.ndarray:
     return x > x.max() - 1e-6 * np.ptp(x)
 
 
+def mean_edge(mesh: wc.TetMesh) -> float:
+    """Mean length of an edge at rest [m]."""
+    p, q = mesh.edges.T
+    return float(np.linalg.norm(mesh.vertices[p] - mesh.vertices[q], axis=1).mean())
+
+
 def gradients(x: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Of the linear shape functions of the corners of each tet [1/m], shape (n_tet, 4, 3)."""
     g = np.linalg.inv(x[tets[:, 1:]] - x[tets[:, :1]]).swapaxes(1, 2)

@@ -162,10 +162,10 @@ def ladder(ask: Ask) -> Figures:
         yield from carry(ask, ratio)
 
 
-def cubes(ratio: float, young: float) -> Pile:
+def cubes(ratio: float, young: float, damping: float = 0.0) -> Pile:
     """Both, the centre of the light one at the origin."""
     both = [
-        Column(young, EDGE, density, (n, n, n), (EDGE, EDGE))
+        Column(young, EDGE, density, (n, n, n), (EDGE, EDGE), damping=damping)
         for density, n in zip((DENSITY, ratio * DENSITY), CUBES, strict=True)
     ]
     return Pile(both, APART, -0.5 * EDGE, gravity=G, friction=0.3)

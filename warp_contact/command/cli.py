@@ -1,7 +1,7 @@
 """The command line: ``warp-contact run | scenes | info | render | validate``.
 
-Exit codes: 0 done, 1 failed on the way, 2 wrong usage or input, 130 interrupted. What goes wrong is
-said in one line on stderr; ``--debug`` before the command raises it instead.
+Exit codes: 0 done, 1 failed on the way, 2 wrong usage or input, 130 interrupted. An error is one
+line on stderr; ``--debug`` before the command raises it instead.
 """
 
 import argparse

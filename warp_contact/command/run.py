@@ -1,7 +1,7 @@
 """The command ``run``: a scene, by its name or its file, to frames, metrics and checkpoints.
 
 A run lives in one folder, beside its USD: ``metrics.jsonl``, a line a frame, and
-``checkpoint.npz``, from which ``--resume`` goes on.
+``checkpoint.npz``, from which ``--resume`` continues.
 """
 
 import ast
@@ -87,7 +87,7 @@ def take_frames(sim: Simulation, n: int, writer: UsdWriter, log, saved: Path, ar
 
 
 def go_on(sim, root: Path, saved: Path, metrics: Path) -> int:
-    """Take an earlier run up at its checkpoint; return how much of the metrics it keeps [bytes].
+    """Continue an earlier run at its checkpoint; return how much of its metrics stays [bytes].
 
     Raises:
         OSError: a file of the run cannot be read
@@ -106,7 +106,7 @@ def go_on(sim, root: Path, saved: Path, metrics: Path) -> int:
     points, first = read_points(stage, 0), json.loads(lines[0])
     same = list(points) == list(bodies)
     same = same and all(np.array_equal(points[k], x[body.ids]) for k, body in bodies.items())
-    # Of what is measured, these are sums on the host, the same for every device.
+    # These measures are sums on the host, the same for every device.
     if not same or any(begun[k] != first[k] for k in ("kinetic", "momentum", "angular_momentum")):
         raise ValueError(f"{saved} is of a run with other bodies, or placed or moved otherwise")
     return sum(map(len, lines))

@@ -1,4 +1,4 @@
-"""Launches over lists that are in use in part, and stages that run on a condition.
+"""Launches over lists that are partly in use, and stages that run on a condition.
 
 On the CPU threads run one after another. Each loads all arguments of its kernel first, which costs
 more than an unused entry of a list. Kernels over lists therefore take the number of threads, and

@@ -10,6 +10,7 @@ from warp_contact.data import (
     contacts,
     narrow_phase,
     overflow,
+    scan,
     surface,
     sweeps,
     warm_start,
@@ -29,11 +30,12 @@ class Work:
         capacity: of the lists
         overflow: what did not fit
         dt: the step [s], shape (1,)
-        share: of the stages of the damping [-], shape (1,)
+        share: weight of the damped velocity [-], shape (1,)
         steps: how many the frame still has, shape (1,)
         awake: what moves
         mesh: what the search for contacts reads of the model
         mobility: how vertices answer impulses
+        scan: scratch of running sums
         f_tet: forces on the corners of each tet [N], shape (4 n_tet,)
         x: predicted positions, then those before the search [m], shape (n_vert,)
         v: scratch of the damping [m/s], shape (n_vert,)
@@ -54,6 +56,7 @@ class Work:
     awake: Awake
     mesh: Mesh
     mobility: Mobility
+    scan: list[wp.array[int]]
     f_tet: wp.array[wp.vec3]
     x: wp.array[wp.vec3]
     v: wp.array[wp.vec3]
@@ -103,6 +106,9 @@ def allocate_work(
         awake=awake or everything(model),
         mesh=mesh_of(model, broad.surface),
         mobility=mobility_of(model),
+        scan=scan.allocate(
+            max(2 * n + 2, model.n_edge + 1, capacity.verts + 1, capacity.edges + 1)
+        ),
         f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=wp.zeros(n, dtype=wp.vec3),
         v=wp.zeros(n, dtype=wp.vec3),

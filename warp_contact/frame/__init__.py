@@ -1,1 +1,1 @@
-"""Frames: how many steps each takes, what is repeated, who sleeps. Reads back between steps."""
+"""Frames: the number of steps, repeats, sleeping bodies. Reads back between steps."""

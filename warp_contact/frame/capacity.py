@@ -1,4 +1,4 @@
-"""The room that a frame needs in its buffers, where it had too little."""
+"""Larger capacities for a frame whose buffers were too small."""
 
 from dataclasses import astuple
 
@@ -11,8 +11,8 @@ from warp_contact.data.work import Work
 def enlarged(work: Work) -> Capacity | None:
     """Twice what the frame would have needed, or None where all fitted.
 
-    What is more than half full then grows too: lists grow together, and each time that one does not
-    fit its frame is lost.
+    Buffers more than half full grow too: lists grow together, and each time that one does not fit a
+    frame is lost.
     """
     needed = work.overflow.all.numpy()
     if not needed.any():

@@ -1,4 +1,4 @@
-"""A run on disk: what a simulation of the same scene needs to go on with the same bits."""
+"""A run on disk: what a simulation of the same scene needs to continue with the same bits."""
 
 import hashlib
 import os
@@ -13,7 +13,7 @@ FORMAT = 4
 
 
 def fingerprint(model: Model, *settings) -> str:
-    """Digest of all that must be the same for a run to go on as it was."""
+    """Digest of all that must be the same for a run to continue with the same bits."""
     digest = hashlib.sha256(repr((FORMAT, model.gravity, model.friction, settings)).encode())
     arrays = [model.body_vert, model.body_world, model.tets, model.pose, model.mass, model.inv_mass]
     arrays += [model.plane_n, model.plane_h]

@@ -1,4 +1,4 @@
-"""Names of what a run broke down at."""
+"""Names of the vertex or tet at which a run failed."""
 
 import numpy as np
 import warp as wp

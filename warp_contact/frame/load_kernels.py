@@ -1,8 +1,9 @@
-"""Kernels compiled ahead, several modules at a time; each compiles on its first use otherwise."""
+"""Compile kernels ahead, several modules at a time; otherwise each compiles on its first use."""
 
 import warp as wp
 
 from warp_contact.data.model import Model
+from warp_contact.kernels import scan
 from warp_contact.kernels.broad_phase import bounds, edges, hashing, near, pairs, skins
 from warp_contact.kernels.elastic import shape
 from warp_contact.kernels.impulse import constraint, impulse, pair_impulses, warm_start
@@ -17,9 +18,9 @@ from warp_contact.kernels.narrow_phase import (
 from warp_contact.kernels.narrow_phase import edges as crossing
 from warp_contact.kernels.surface import closure, residual
 
-# What a frame of any scene uses. The search for overlaps at the start, other responses, sleep and
-# measuring are left out: many scenes do without.
-ALWAYS = (bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure)
+# What a frame of any scene uses. The search for overlaps at the start, other responses, sleeping
+# and measuring are left out: many scenes do not need them.
+ALWAYS = (scan, bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure)
 ALWAYS += (constraint, impulse, pair_impulses, warm_start, residual)
 ALWAYS += (contact_graph, crossing, depth, persistent, vertex_contact, vertices)
 

@@ -8,9 +8,9 @@ from warp_contact.step.detection import detect_vertices
 
 
 def overlaps(model: Model, state: State, work: Work) -> bool:
-    """Whether bodies overlap by more than a search is worth; reads back.
+    """Whether bodies overlap by enough for a search; reads back.
 
-    What did not fit was not looked at: see ``work.overflow``.
+    Pairs and contacts that did not fit were not tested: see ``work.overflow``.
     """
     work.dt.fill_(1.0)
     work.overflow.all.zero_()

@@ -1,12 +1,12 @@
-"""Bodies that are at rest sleep: nothing is computed for them until something comes near.
+"""Sleeping: nothing is computed for islands at rest until something comes near.
 
-What sleeps stays within ``STILL`` of an edge of where it was ``REST_TIME`` before; the
-contact forces and pressures on it are those of its last frame awake, and it counts no contacts.
-Momentum and energy change by what motion it had left. What creeps slower than ``STILL`` in
-``REST_TIME`` is stopped, but for what moves because fixed vertices do. ``Simulation.set_velocity``
-wakes a body; a small velocity written into ``Simulation.state`` is lost on one that sleeps.
+A body falls asleep within ``STILL`` edges of where it was ``REST_TIME`` before. Asleep, it has the
+contact forces and pressures of its last frame awake, and counts no contacts. Momentum and energy
+change by the motion that is stopped. A body that creeps slower than ``STILL`` in ``REST_TIME`` is
+stopped too, unless moving fixed vertices drive it. ``Simulation.set_velocity`` wakes a body; a
+small velocity written into ``Simulation.state`` is lost on a sleeping one.
 
-Only for scenes with gravity: what stays where it is although it has weight is held.
+Only for scenes with gravity: a body that stays in place despite its weight is supported.
 """
 
 import math
@@ -25,7 +25,7 @@ REST_TIME = 0.5  # s that a body has to be at rest before it may sleep
 
 
 class Sleeping:
-    """Knows for how long each body has been at rest; its ``awake`` says who moves."""
+    """Knows for how long each body has been at rest; its ``awake`` says which bodies move."""
 
     def __init__(self, model: Model, state: State, fps: float):
         """Everything is awake; frames come ``fps`` times a second."""
@@ -46,7 +46,7 @@ class Sleeping:
         self._before = np.ones(model.n_body, dtype=np.int32)  # awake in the last frame
 
     def values(self, work: Work) -> dict[str, np.ndarray]:
-        """What another one needs to go on from here."""
+        """What another instance needs to continue from here."""
         awake = np.append(self.awake.bodies.numpy() == 1, np.zeros(self.model.n_plane, dtype=bool))
         key, total = work.forces.pair_key.numpy(), work.forces.pair_total.numpy()
         key, total = key[key >= 0], total[key >= 0]
@@ -62,7 +62,7 @@ class Sleeping:
         }
 
     def restore(self, values: dict[str, np.ndarray], work: Work) -> None:
-        """Take over the ``values`` of another one; ``work`` has room for its pairs."""
+        """Take over the ``values`` of another instance; its pairs fit into ``work``."""
         n = len(values["pair_key"])
         self._anchor.assign(values["anchor"])
         self._frames.assign(values["frames"])
@@ -75,18 +75,18 @@ class Sleeping:
             work.forces.pair_total[:n].assign(values["pair_total"])
 
     def wake(self, body: int) -> None:
-        """Let a body's rest begin anew."""
+        """Wake a body: its rest begins again."""
         self._frames[body : body + 1].zero_()
 
     def wake_all(self, work: Work) -> None:
-        """Let everybody's rest begin anew, awake in the next frame."""
+        """Wake all bodies: they are awake in the next frame, and their rest begins again."""
         self._frames.zero_()
         self.awake.bodies.fill_(1)
         self._before = np.ones(self.model.n_body, dtype=np.int32)
         self._pause(work)
 
     def update(self, state: State, work: Work) -> bool:
-        """Before a frame: decide who sleeps. False when nothing is awake."""
+        """Before a frame: decide which bodies sleep. False when all do."""
         model, awake = self.model, self.awake
         for array in (self._moved, self._mobile, self._speed):
             array.zero_()
@@ -125,7 +125,7 @@ class Sleeping:
         return bool(bodies.any())
 
     def _pause(self, work: Work) -> None:
-        """Let the tets know, and look for pairs anew."""
+        """Mark the tets of bodies awake, and have the pairs found again."""
         wp.launch(
             kernels.pause_tets,
             dim=self.model.n_tet,
@@ -150,7 +150,7 @@ class Sleeping:
         work.contacts.n.zero_()
 
     def begin_frame(self, state: State, work: Work) -> None:
-        """Stop who sleeps, and forget the contact forces of all others."""
+        """Stop sleeping bodies, and forget the contact forces of all others."""
         model, awake = self.model, self.awake
         wp.launch(
             kernels.pause_vertices,

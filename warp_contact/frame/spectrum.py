@@ -14,9 +14,9 @@ DEPTH = 8  # Lanczos steps of a restart in the first call
 SHORT = 4  # in later calls
 CHUNK = 64  # vertices summed by one thread
 FIRST, LATER = (3, 8), (1, 2)  # fewest and most restarts in the first call, in later calls
-NOISE = 0.1  # random part of a restart, so that a mode elsewhere can come up
+NOISE = 0.1  # random part of a restart, so that a mode elsewhere can appear
 SECOND = 0.3  # part of the second mode in a restart, so that it can overtake
-CONVERGED = 0.02  # gap between the estimate and its bound that ends the restarts, of lambda
+CONVERGED = 0.02  # gap between estimate and bound at which restarts end, relative to lambda
 LITTLE = 0.01  # change of shape, see elastic/shape.py, that moves a rate by some percent at most
 MUCH = 0.2  # change that makes a frequency at most SLOWER times as large, a damping its square
 SLOWER = 4.0
@@ -27,7 +27,7 @@ class Spectrum:
     """Largest eigenvalues of M^-1 K and of M^-1 C, assembled, fixed vertices left out.
 
     Restarted Lanczos in the mass inner product, separately for every body but in the same
-    launches, so that a small stiff body is not drowned by the others. The result is the largest
+    launches, so that a small stiff body is not hidden by the others. The result is the largest
     |Ritz value| + residual norm of any body: there is an eigenvalue that close, and in practice
     it bounds the spectrum (Zhou, Saad, Tiago, Chelikowsky 2006, "Self-consistent-field
     calculations using Chebyshev-filtered subspace iteration"). On random meshes of
@@ -38,7 +38,7 @@ class Spectrum:
     Deterministic: the first start vector is a fixed random one. Reads back once per restart.
 
     Attributes:
-        flat: whether a tet was so flat, where ``rates`` were last asked for, that they may rise
+        flat: whether a tet was so flat, at the last call of ``rates``, that they may rise
             many times in a few steps
     """
 
@@ -65,7 +65,7 @@ class Spectrum:
         self._of_bodies = np.zeros((2, model.n_body))
 
     def rates(self, x: wp.array) -> tuple[float, float]:
-        """``omega`` and ``damping_rate``, or those of a former call while shapes are close to it.
+        """``omega`` and ``damping_rate``, or those of an earlier call while shapes are close to it.
 
         Rigid motion changes no rate. A body whose own rates are far below the largest may change
         its shape by more than the others until they are found again.
@@ -86,7 +86,7 @@ class Spectrum:
         wp.launch(shape.remember, dim=m.n_tet, inputs=[m.tets, x], outputs=[self._before])
 
     def _changes(self, x: wp.array) -> np.ndarray:
-        """How far shapes at ``x`` [m] are from those kept, and who has a flat tet: (2, n_body)."""
+        """How far shapes at ``x`` [m] are from those kept, and where a tet is flat: (2, n_body)."""
         m = self._model
         self._change.zero_()
         inputs = [m.tets, m.vert_body, m.pose, self._before, x, neo_hookean.SQUASHED]
@@ -94,7 +94,7 @@ class Spectrum:
         return self._change.numpy()
 
     def _close(self, change: np.ndarray) -> bool:
-        """Whether the rates at the shapes kept do after such changes, shape (n_body,)."""
+        """Whether the rates at the shapes kept suffice after such changes, shape (n_body,)."""
         most = self._of_bodies.max(axis=1, keepdims=True)
         slow = (self._of_bodies * [[SLOWER], [SLOWER**2]] <= most).all(axis=0)
         allowed = np.where(slow, MUCH, LITTLE)

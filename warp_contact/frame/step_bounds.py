@@ -1,4 +1,4 @@
-"""How many equal steps a frame takes, and whether they proved enough.
+"""How many equal steps a frame takes, and whether they turned out short enough.
 
     stable  = omega / (2 SAFETY)                     [1/s]  2 / omega is stable without damping
     passing = u / (REACH t)                          [1/s]  nothing jumps through a body
@@ -6,10 +6,10 @@
     n       = max(ceil(max(stable, passing, gentle) / fps), floor(KEEP n_last), 1)
 
 omega is the largest frequency of the elastic forces [1/s], u the largest relative speed [m/s], t
-the thickness of the thinnest body [m] and e the shortest mean edge of a body [m]. They are those at
-the start of the frame. While there may be overlaps from before, LINGERING stands for TRAVEL. At its
-end the step must still be below ``UNSTABLE`` of ``forces.longest_step`` / omega, and its damping
-within ``forces.reach``; a frame that fails is repeated at the rates found there.
+the thickness of the thinnest body [m] and e the shortest mean edge of a body [m], all at the start
+of the frame. LINGERING replaces TRAVEL while there may be overlaps older than the step. At the end
+of the frame the step must still be below ``UNSTABLE`` of ``forces.longest_step`` / omega, and its
+damping within ``forces.reach``. A frame that fails is repeated at the rates found there.
 """
 
 import math
@@ -20,12 +20,12 @@ from warp_contact.step.forces import longest_step, reach, share_for, stages_for
 SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 0.99  # of the longest stable step at the end of a frame, above which it is repeated
 RAISED = 1.2  # times the frequency, at least, in a frame that is repeated
-CUT_SHORT = 2.0  # the same, in one whose steps were seen to be too long before its end
-EXPLODED = 4.0  # times the frequency that the step was long enough for, at most
-REACH = 0.25  # of the thinnest body: how far anything may move against anything else in a step
-PATIENCE = 2.0  # stable steps, at most, that both are worth
-BLURRED = 1.05  # times the stable step: how well that is known
-LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 let some pass
+CUT_SHORT = 2.0  # the same, in one that was stopped before its end
+EXPLODED = 4.0  # times the frequency that the step was chosen for, at most
+REACH = 0.25  # of the thinnest body: the largest relative motion in a step
+PATIENCE = 2.0  # times the stable number of steps: more are not taken for TRAVEL or LINGERING
+BLURRED = 1.05  # times the stable step: its uncertainty
+LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 lets some pass
 KEEP = (
     0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
 )
@@ -41,7 +41,7 @@ def steps_per_second(
         speed: largest relative speed [m/s]
         thickness: of the thinnest body [m]
         edge: shortest mean edge of a body [m]
-        overlaps: whether some may last: of the start, or such that the response leaves
+        overlaps: whether some may last: from the start, or because the response leaves them
     """
     stable = omega / (2.0 * SAFETY)
     passing = speed / (REACH * thickness)
@@ -51,7 +51,7 @@ def steps_per_second(
 
 
 def steps_in_frame(per_second: float, fps: float, last: int) -> int:
-    """Whole steps in a frame: ``per_second`` [1/s], and hardly fewer than the ``last`` frame's."""
+    """Whole steps in a frame: ``per_second`` [1/s], at least KEEP of the ``last`` frame's."""
     return max(1, int(KEEP * last), math.ceil(per_second / fps))
 
 
@@ -63,13 +63,13 @@ def with_penalty(omega: float, stiffness: float, inv_mass: float) -> float:
 def stays_stable(dt: float, omega: float, rate: float) -> bool:
     """Whether a step ``dt`` [s] is stable at the frequency ``omega`` [1/s] of its frame's end.
 
-    With the damping of a ``rate`` [1/s] at its start.
+    With the damping for a ``rate`` [1/s], that at its start.
     """
     return dt * omega <= UNSTABLE * longest_step(stages_for(rate, dt), share_for(rate, dt))
 
 
 def stays_damped(dt: float, rate: float, after: float) -> bool:
-    """Whether stages and share for the damping ``rate`` [1/s] do for that ``after`` it too."""
+    """Whether stages and share for the damping ``rate`` [1/s] suffice for that ``after`` too."""
     return after * dt <= reach(stages_for(rate, dt), share_for(rate, dt))
 
 
@@ -85,8 +85,8 @@ def raised(
 
     Args:
         before: at its start
-        after: where that was seen; a state that has begun to explode is no guide
-        dt: the step [s]; more than ``before`` may have asked for it
+        after: where the step failed; limited, as that state may have begun to explode
+        dt: the step [s], which other limits than ``before`` may have shortened
         least: times the frequency, at least
     """
     most = EXPLODED * max(before[0], served(dt))
@@ -95,7 +95,7 @@ def raised(
 
 
 def fault(dt: float, omega: float, speed: float, thickness: float) -> str:
-    """Why a step ``dt`` [s] that the user chose cannot be taken, or nothing.
+    """Why a step ``dt`` [s] that the user chose cannot be taken; empty if it can.
 
     The speed matters at the start of a run only: in an impact single vertices are faster.
 

@@ -61,7 +61,7 @@ class StepCount:
         return step_bounds.steps_in_frame(per_second, self.fps, last)
 
     def check(self, state: State, omega: float, frame: int) -> None:
-        """Refuse steps that the user chose too long; their way in a step counts in frame 1 only.
+        """Refuse steps that the user chose too long; the motion in a step counts in frame 1 only.
 
         Args:
             state: at the start of the frame

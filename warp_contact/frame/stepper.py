@@ -1,4 +1,4 @@
-"""One frame of a simulation: its steps, and once more where they or their buffers did not do."""
+"""One frame of a simulation, repeated where its steps were too long or its buffers too small."""
 
 import math
 from dataclasses import replace
@@ -32,11 +32,11 @@ from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.motion import kick
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
-NEIGHBOURS = 8  # pairs with a contact force for each body that there is room for at first
+NEIGHBOURS = 8  # initial capacity: pairs with a contact force for each body
 IMPULSE_UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
-HALVED = 3  # times that the steps of a frame are halved because its state, or stiffness, is lost
-NO_RATES = math.inf, math.inf  # of a state that is lost
-PART = 8  # steps between two looks at the rates, in frames that begin or end with a flat tet
+HALVED = 3  # times at most that a step is halved because state or stiffness is not finite
+NO_RATES = math.inf, math.inf  # of a state that is not finite
+PART = 8  # steps between two checks of the rates, in frames that begin or end with a flat tet
 ATTEMPTS = 12  # at a frame, with shorter steps each time
 
 
@@ -48,10 +48,10 @@ class Stepper:
         wanted: steps in a frame that the user chose, or None
         n: steps of the last frame
         dt: their length [s], None before the first
-        rates: largest elastic frequency and damping rate at its end [1/s], None where to be found
+        rates: largest elastic frequency and damping rate at its end [1/s], None if to be found
         overlapping: whether there may be overlaps that no step created; None where it is not known
         work: buffers, with the contacts of the last step
-        sleeping: who sleeps; None where nobody may
+        sleeping: which bodies sleep; None where none may
         spectrum: finds the rates
         unit: resolution of the recorded contact impulses [N s]
     """
@@ -74,7 +74,7 @@ class Stepper:
         self._model, self._state, self._response = model, state, response
         self._step_count = StepCount(model, response, fps, wanted)
         self.spectrum = Spectrum(model)
-        # Without weight, what hardly moves need not be held by anything: it flies.
+        # Without gravity, a slow body may be in free flight, not at rest.
         may_sleep = sleeping and any(model.gravity)
         self.sleeping = Sleeping(model, state, fps) if may_sleep else None
         inv_mass = model.inv_mass.numpy()
@@ -90,8 +90,8 @@ class Stepper:
         """Step frame number ``frame``.
 
         A frame that outgrew its buffers, or whose step turned out too long for the deformation
-        that came, is repeated from its start. Where it begins or ends with a tet that is nearly
-        flat, the step is looked at every ``PART`` steps.
+        that came, is repeated from its start. If it begins or ends with a tet that is nearly
+        flat, the rates are checked every ``PART`` steps.
 
         Raises:
             SimulationError: no step is stable, or the state does not stay finite; it is then that
@@ -108,7 +108,7 @@ class Stepper:
         self.overlapping = self.overlapping and bool(self.work.surface.was_old.numpy()[0])
 
     def _all_sleep(self) -> bool:
-        """Decide who sleeps; where all do, nothing moves in this frame."""
+        """Decide which bodies sleep; where all do, nothing moves in this frame."""
         if (
             not self.sleeping or self.overlapping is not False
         ):  # an overlap that is left has to be searched
@@ -119,7 +119,7 @@ class Stepper:
         return True
 
     def _find_step(self, frame: int) -> tuple[float, tuple[float, float]]:
-        """Step the frame, again and again until its step fits; the step [s] and the last rates."""
+        """Step the frame until its step fits; return the step [s] and the last rates."""
         omega, rate = self.rates or self.spectrum.rates(self._state.x)
         self._step_count.check(self._state, omega, frame)
         last, halved = self.n, 0
@@ -145,7 +145,7 @@ class Stepper:
         raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
 
     def _look(self) -> tuple[tuple[float, float], str]:
-        """Rates of the present state [1/s], and what is wrong with it: empty where nothing is."""
+        """Rates of the present state [1/s], and what is wrong with it: empty if nothing is."""
         lost = lost_vertex(self._state)
         if lost is not None:
             return NO_RATES, f"{vertex_name(self._model, lost)} is no longer finite"
@@ -156,23 +156,23 @@ class Stepper:
         return after, ""
 
     def _flat(self) -> bool:
-        """Whether a tet was flat at the last look, and the number of steps is free."""
+        """Whether a tet was flat at the last check, and the number of steps is free."""
         return self.wanted is None and self.spectrum.flat
 
     def _fits(self, dt: float, rate: float, after: tuple[float, float]) -> bool:
-        """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] do for rates ``after`` them."""
+        """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] fit the rates ``after`` them."""
         stable = self.wanted is not None or stays_stable(dt, after[0], rate)
         return stable and stays_damped(dt, rate, after[1])
 
     def look_anew(self) -> None:
-        """Before the next frame: positions were set from outside."""
+        """Positions were set from outside: find overlaps and rates before the next frame."""
         self.overlapping = None
         self.rates = None
         if self.sleeping:
             self.sleeping.wake_all(self.work)
 
     def use(self, work: Work) -> None:
-        """Go on in other buffers."""
+        """Continue with other buffers."""
         self.work = work
         work.forces.unit = self.unit
         self._graphs.clear()
@@ -207,7 +207,7 @@ class Stepper:
         return values
 
     def restore(self, values: dict[str, np.ndarray]) -> None:
-        """Take over the ``values`` of another one of the same scene and settings."""
+        """Take over the ``values`` of another instance with the same scene and settings."""
         self.n = int(values["substeps"])
         self.spectrum.start_from(checkpoint.group(values, "start"))
         sleeping = checkpoint.group(values, "sleeping")
@@ -228,8 +228,8 @@ class Stepper:
     ) -> tuple[float, tuple[float, float], str]:
         """Step the frame at the rates [1/s] given, after ``last`` steps.
 
-        Return the step [s] and what ``_look`` finds at the end. With ``in_parts`` that is where the
-        step does not fit any more; where the buffers were outgrown, nothing was found.
+        Return the step [s] and what ``_look`` finds at the end. With ``in_parts`` the frame ends as
+        soon as its step no longer fits. Where buffers were too small, nothing was found.
         """
         work = self.work
         if self.sleeping:
@@ -277,7 +277,7 @@ class Stepper:
         return allocate_work(self._model, self._state, capacity, awake, self.unit)
 
     def _replace_work(self, capacity: Capacity) -> None:
-        """Allocate anew; old and new buffers at once would be the peak of the memory."""
+        """Free the buffers, then allocate: old and new ones at once would be the peak of memory."""
         before = self.work.capacity
         self._graphs.clear()
         del self.work

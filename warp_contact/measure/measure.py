@@ -24,7 +24,7 @@ class Measure:
     Attributes:
         kinetic: energy [J] at the time of the frame; the velocities of symplectic Euler are those
             of half a step earlier, so h/2 times the power of internal forces and gravity is added.
-            The sum of all energies is then constant where a linear material flies freely, and a
+            The sum of all energies is then constant for a linear material in free flight, and a
             contact impulse p changes it by p . (v + v') / 2, v and v' the velocities before and
             after the step: not at all while the contact stays closed
         elastic: energy [J]
@@ -37,11 +37,11 @@ class Measure:
         volume_ratio: smallest volume of a tet over its rest volume
         inverted: tets that are inside out or flat
         tunnelled: points that went through another body so far; a point is a surface vertex or the
-            middle of a surface edge. It counts where it goes out by a face that looks away from the
+            middle of a surface edge. It counts where it goes out by a face that faces away from the
             one by which it came in and was deeper than a tenth of the body's thickness (twice its
             volume over its surface), or where it gets deeper below a plane than its own body is
-            thick. From one call to the next, ways are taken as straight: call often. Not seen:
-            what happened before the first call, what turned round between two calls, points that
+            thick. Between two calls paths are taken as straight: call often. Not counted:
+            what happened before the first call, what turned back between two calls, points that
             were inside a body at the first call, and parts that slip between the points of a
             coarser body. A body that starts on both sides of another and is led back counts
         tunnelled_pair: labels of the bodies of the last of these, the one that went through first
@@ -75,7 +75,7 @@ class Meter:
     """Measures states of one model; its memory is allocated at the first use.
 
     Attributes:
-        tunnelling: remembers the last state measured, to tell what went through what since then
+        tunnelling: remembers the last state measured, to tell what went through a body since then
     """
 
     def __init__(self, model: Model):
@@ -143,7 +143,7 @@ class Meter:
         return out
 
     def overlap(self, x: wp.array, work: Work) -> tuple[float, tuple[str, str] | None, int]:
-        """Deepest overlap [m], the labels of its bodies, and the vertices that nothing holds."""
+        """Deepest overlap [m], the labels of its bodies, and the number of ``unheld`` vertices."""
         model = self.model
         trees = self._trees
         trees.refit(x, x)
@@ -168,7 +168,7 @@ class Meter:
         if depth[k] <= 0.0:
             return 0.0, None, 0
         own = model.vert_body.numpy()[first]
-        awake = work.awake.bodies.numpy()[own] == 1  # the others are held
+        awake = work.awake.bodies.numpy()[own] == 1  # those asleep are held
         deep = awake & (depth > UNHELD * model.body_edge.numpy()[own])
         unheld = np.setdiff1d(first[: model.n_surf][deep[: model.n_surf]], _held(work))
         return float(depth[k]), (self.names[own[k]], self.names[partner[k]]), len(unheld)

@@ -1,4 +1,4 @@
-"""Trees over bodies, triangles and tets, for looks that do not use those of the step."""
+"""Bvhs over bodies, triangles and tets for measurements: those of the step are not used."""
 
 import numpy as np
 import warp as wp
@@ -15,9 +15,9 @@ class Trees:
     """Built at the first use.
 
     Attributes:
-        bodies: Bvh over the ways of the bodies, grouped by world
+        bodies: Bvh over the paths of the bodies, grouped by world
         volumes: Bvh over the tets, grouped by world
-        mesh: with a Bvh over the ways of the triangles
+        mesh: with a Bvh over the paths of the triangles
     """
 
     def __init__(self, model: Model):
@@ -31,7 +31,7 @@ class Trees:
         self.mesh: Mesh | None = None
 
     def refit(self, x0: wp.array, x: wp.array) -> None:
-        """Take the ways of bodies and triangles from x0 to x, and the tets at x."""
+        """Take the paths of bodies and triangles from x0 to x, and the tets at x."""
         model = self._model
         of_body, of_tri, of_tet = (list(box) for box in self._boxes)
         wp.launch(bounds.clear_boxes, dim=model.n_body, inputs=[], outputs=of_body)

@@ -1,4 +1,4 @@
-"""What went through what since the first look, from look to look."""
+"""Which points went through a body or a plane since the first call."""
 
 import numpy as np
 import warp as wp
@@ -9,7 +9,7 @@ from warp_contact.measure.trees import Trees
 
 
 class Tunnelling:
-    """Counts the points that go through a body or deep below a plane; remembers the last look.
+    """Counts the points that go through a body or deep below a plane; remembers the last state.
 
     Attributes:
         count: of these points so far
@@ -17,7 +17,7 @@ class Tunnelling:
     """
 
     def __init__(self, model: Model, names: list[str], trees: Trees):
-        """Before the first look; ``names`` are those of bodies, then of planes."""
+        """Before the first state; ``names`` are those of bodies, then of planes."""
         self.count = 0
         self.pair: tuple[str, str] | None = None
         self._model, self._names, self._trees = model, names, trees
@@ -33,7 +33,7 @@ class Tunnelling:
         return memory | {"tunnelled": np.array(self.count), "tunnelled_pair": pair}
 
     def remember(self, memory: dict[str, np.ndarray]) -> None:
-        """Go on from the ``memory`` of another one of the same model."""
+        """Continue from the ``memory`` of another instance of the same model."""
         if not memory:
             return
         self._begin(wp.array(memory["last"], dtype=wp.vec3))
@@ -66,7 +66,7 @@ class Tunnelling:
             self.pair = self._names[own], self._names[body[through[-1]]]
 
     def jump(self, x: wp.array, first: int, last: int) -> None:
-        """Go on from positions ``x`` that no motion led to, of the bodies ``first`` to ``last``."""
+        """Continue from ``x``; bodies ``first`` to ``last`` were placed there without motion."""
         own = self._model.vert_body.numpy()[self._ends.numpy()[:, 0]]
         entered, deep = self._entered.numpy(), self._deep.numpy()
         into = np.where(entered < 0, -1, self._model.tri_body.numpy()[entered])

@@ -31,7 +31,7 @@ class Camera:
 
 
 class Renderer:
-    """Draws triangles that move but stay connected as they are."""
+    """Draws moving triangles of constant connectivity."""
 
     def __init__(self, tris, rest, planes=(), size=(960, 540), samples=2, rays=4, wire=0.0):
         """Prepare for a mesh.
@@ -42,7 +42,7 @@ class Renderer:
             planes: normal and offset [m] of each half-space
             size: width and height [pixels]
             samples: rays along each side of a pixel
-            rays: rays of each of them to the sun, and to the sky
+            rays: rays of each sample to the sun, and to the sky
             wire: how much the edges of the triangles are darkened, 0 ... 1
         """
         tris = np.ascontiguousarray(tris, dtype=np.int32).reshape(-1, 3)

@@ -43,7 +43,7 @@ def render(
             place from where all frames are in view
         target: what the camera looks at [m]; None as for ``eye``
         samples: rays along each side of a pixel
-        rays: rays of each of them to the sun, and to the sky
+        rays: rays of each sample to the sun, and to the sky
         wire: how much the edges of the triangles are darkened, 0 ... 1
         floor: draw a ground under the lowest point where the scene has no half-space
         device: Warp device

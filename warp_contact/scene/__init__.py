@@ -1,1 +1,1 @@
-"""What is simulated: meshes, materials, bodies, and the model that they make. Knows no step."""
+"""What is simulated: meshes, materials, bodies, and the model that they make. Knows no steps."""

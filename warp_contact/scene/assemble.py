@@ -13,7 +13,7 @@ def assemble(scene: Scene) -> tuple[Model, State]:
     """Lay the bodies of a scene out one behind the other, on the current device.
 
     Raises:
-        ValueError: the scene has no body, or bodies where none can be, see ``placement``
+        ValueError: the scene has no body, or a placement that ``placement.check`` refuses
     """
     bodies = scene.bodies
     if not bodies:

@@ -1,10 +1,10 @@
 """Constitutive models: what the user names, and the parameters the kernels read.
 
-A model is one kernel file (``warp_contact/kernels/<model>.py``) and one class here with
+A model is one kernel file (``kernels/elastic/<model>.py``) and one class here with
 
-* ``kernels``: that file; it provides the kernels ``set_forces``, ``apply_stiffness``,
-  ``apply_damping`` and ``energies``, each with one signature for all models but for ``param``, an
-  array of ``ROW``: the type of a row of parameters, a Warp vector, or ``float`` for two dimensions;
+* ``kernels``: that file. It provides the kernels ``set_forces``, ``apply_stiffness``,
+  ``apply_damping`` and ``energies``. Their signatures are the same for all models except for
+  ``param``, an array of ``ROW``: a Warp vector, or ``float`` where ``param`` has two dimensions;
 * ``density`` [kg/m^3] and ``damping`` [s];
 * ``parameters(vertices, tets)``: one row per tet, in the order in which the kernels read it;
 * ``check()``: raises ValueError with a reason.
@@ -55,7 +55,7 @@ class _Solid:
     damping: float = 0.0
 
     def check(self) -> None:
-        """Raise ValueError where the numbers make no material."""
+        """Raise ValueError if the numbers make no material."""
         _check_common(self)
         if self.youngs_modulus <= 0.0:
             raise ValueError(f"youngs_modulus must be positive, not {self.youngs_modulus} Pa")
@@ -107,7 +107,7 @@ class SpringNetwork:
     kernels: ClassVar[ModuleType] = springs
 
     def check(self) -> None:
-        """Raise ValueError where the numbers make no material."""
+        """Raise ValueError if the numbers make no material."""
         _check_common(self)
         for name in ("distance", "area", "volume"):
             if getattr(self, name) < 0.0:

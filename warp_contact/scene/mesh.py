@@ -112,7 +112,7 @@ class TetMesh:
 
         From USD comes the first TetMesh or the one at the path ``prim``, as placed in the stage at
         its earliest time, and in metres where the stage says what its unit is. Other formats often
-        list vertices that only serve their construction: those that no tet uses are dropped.
+        list auxiliary vertices: those that no tet uses are dropped.
         """
         path = Path(path)
         if not path.exists():
@@ -137,7 +137,7 @@ def _load_npz(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _or_mesh_error(path: Path, verb: str, action):
-    """Run a reader or writer: it keeps silent, and what it dislikes becomes one MeshError."""
+    """Run a reader or writer without output; its errors become one MeshError."""
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             return action()

@@ -1,19 +1,19 @@
-"""Where bodies are placed, and where there is no simulation to start from."""
+"""Checks of the placement of bodies: where no simulation can start."""
 
 import numpy as np
 
 from warp_contact.kernels.lengths import REST_GAP, SAME_PLACE
 
 ROUNDING = 2.0**-24  # of a float32, at most
-DROWNED = 10.0  # gaps at rest, by which rounding may move a body: soft ones take it
+DROWNED = 10.0  # resting gaps by which rounding may move a body: soft ones tolerate it
 
 
 def check(bodies: list) -> None:
-    """Every body of a scene by itself and every two.
+    """Check every body of a scene by itself, and every two.
 
     Raises:
         ValueError: naming a body that is so far from the origin that rounding moves it by
-            ``DROWNED`` gaps at rest, or two of one world, not both fixed, that fill the same space:
+            ``DROWNED`` resting gaps, or two of one world, not both fixed, that fill the same space:
             neither is inside the other, and no direction leads out
     """
     edges = [_mean_edge(body) for body in bodies]
@@ -29,7 +29,7 @@ def check(bodies: list) -> None:
     world = np.array([body.world for body in bodies])
     held = np.array([bool(np.all(body.fixed)) for body in bodies])
     mix = np.sqrt(np.arange(2.0, 2.0 + shape.shape[1]))
-    along, reach = shape @ mix, slack.max() * mix.sum()  # like shapes are near each other along it
+    along, reach = shape @ mix, slack.max() * mix.sum()  # equal shapes are near each other along it
     order = np.lexsort((along, world))
     for k in range(1, len(bodies)):
         p, q = order[:-k], order[k:]

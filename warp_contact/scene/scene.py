@@ -8,7 +8,7 @@ import numpy as np
 
 from warp_contact.scene.mesh import TetMesh
 
-PLANE = re.compile(r"plane\d+")  # half-spaces in what is measured
+PLANE = re.compile(r"plane\d+")  # names of half-spaces in measurements
 
 
 @dataclass(frozen=True, eq=False)

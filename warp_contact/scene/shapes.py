@@ -14,12 +14,12 @@ ODD = EVEN ^ 1  # mirrored in x
 
 
 def box(size, cells, mirrored: bool = False) -> TetMesh:
-    """A block of edges ``size`` [m] about the origin, split into ``cells``; one or three of each.
+    """A block of edges ``size`` [m] about the origin, split into ``cells``; one number or three.
 
-    Each cell is cut into five tets, and the cut alternates between a cell and its neighbours like
-    the colours of a chess board, which is what makes it conform. No diagonal runs in the same
-    direction everywhere, so the block has no preferred direction once there are a few cells; the
-    usual six tets about one space diagonal have. ``mirrored`` swaps the two colours.
+    Each cell is cut into five tets. The cut alternates between a cell and its neighbours like the
+    colours of a chess board, so that the mesh conforms. No diagonal runs in the same direction
+    everywhere, so a block of a few cells has no preferred direction. The usual six tets about one
+    space diagonal have one. ``mirrored`` swaps the two colours.
     """
     size = np.broadcast_to(np.asarray(size, dtype=float), 3)
     n = np.broadcast_to(np.asarray(cells, dtype=int), 3)
@@ -89,7 +89,7 @@ def dish(radius: float, depth: float, thickness: float, rings: int = 8, layers: 
 def drum(rings: int, layers: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Cylindrical coordinates of vertices, rho and zeta in 0..1 and theta [rad], and their tets.
 
-    What has an axis is a map of this: a cylinder, a dish, a capsule.
+    A body with an axis is a map of these: a cylinder, a dish, a capsule.
     """
     if rings < 1 or layers < 1:
         raise ValueError(f"a drum needs one ring and one layer or more, got {rings} and {layers}")
@@ -196,7 +196,7 @@ def _coarse_ball() -> tuple[np.ndarray, np.ndarray]:
     across = np.sqrt(1.0 - z * z)
     angle = np.pi * (1.0 + 5.0**0.5) * k
     hull = np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
-    # Size and turn of the inner tet were searched for the best worst tet, 0.53.
+    # Size and rotation of the inner tet maximise the quality of the worst tet, 0.53.
     inner = np.array([[17, -23, 7], [17, 23, -7], [-17, 7, 23], [-17, -7, -23]])
     x = np.concatenate([hull, 0.42 / (17.0 * 3.0**0.5) * inner])
     return x, _delaunay(x, n_hull=37)

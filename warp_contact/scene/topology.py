@@ -17,7 +17,7 @@ class MeshError(ValueError):
 
 
 def unique(key: np.ndarray) -> np.ndarray:
-    """Ascending, each once: one sort, several times faster than the hashing of np.unique here."""
+    """Unique values, ascending: one sort, several times faster than the hashing of np.unique."""
     key = np.sort(key)
     return key[np.concatenate([[True], key[1:] != key[:-1]])]
 
@@ -47,7 +47,7 @@ def as_arrays(vertices, tets) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_elements(x: np.ndarray, tets: np.ndarray) -> None:
-    """Each vertex and each tet by itself."""
+    """Check each vertex and each tet by itself."""
     bad = np.flatnonzero(~(np.abs(x) < HUGE).all(axis=1))
     if len(bad):
         raise MeshError(f"vertex {bad[0]} is not finite or beyond {HUGE:g} m: {x[bad[0]].tolist()}")

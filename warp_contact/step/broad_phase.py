@@ -11,6 +11,7 @@ from warp_contact.data import boxes
 from warp_contact.data.broad_phase import Pairs
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.scan import scan
 from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.broad_phase import edges, hashing, near, skins
@@ -145,7 +146,7 @@ def _find_tets(model: Model, work: Work) -> None:
         inputs=[model.cell, b.skin, model.vert_body, b.near, b.x],
         outputs=[b.key, b.cell_start],
     )
-    wp.utils.array_scan(b.cell_start, b.cell_start, inclusive=True)
+    scan(b.cell_start, work.scan, inclusive=True)
     wp.launch(
         hashing.fill_cells,
         dim=model.n_vert,
@@ -168,7 +169,7 @@ def _find_tets(model: Model, work: Work) -> None:
             outputs=[b.vert_tet, b.n_found],
         )
     overflow = work.overflow.verts, work.overflow.tets
-    _by_pair(b.n_found, b.vert_tet, model.tet_body, b.verts, *overflow)
+    _by_pair(b.n_found, b.vert_tet, model.tet_body, b.verts, work, *overflow)
 
 
 def _find_tris(model: Model, work: Work) -> None:
@@ -182,7 +183,7 @@ def _find_tris(model: Model, work: Work) -> None:
         outputs=[b.edge_tri, b.n_found],
     )
     overflow = work.overflow.edges, work.overflow.tris
-    _by_pair(b.n_found, b.edge_tri, model.tri_body, b.edges, *overflow)
+    _by_pair(b.n_found, b.edge_tri, model.tri_body, b.edges, work, *overflow)
 
 
 def _by_pair(
@@ -190,6 +191,7 @@ def _by_pair(
     found: wp.array,
     item_body: wp.array,
     pairs: Pairs,
+    work: Work,
     pairs_needed: wp.array,
     items_needed: wp.array,
 ) -> None:
@@ -203,7 +205,7 @@ def _by_pair(
         inputs=[n_found, found],
         outputs=[pairs.item_start, items_needed],
     )
-    wp.utils.array_scan(pairs.item_start, pairs.item_start, inclusive=True)
+    scan(pairs.item_start, work.scan, inclusive=True)
     launch_over(
         kernels.fill_items,
         found.shape[0],
@@ -216,7 +218,7 @@ def _by_pair(
         inputs=[item_body, pairs.item_start],
         outputs=[to.item, to.start],
     )
-    wp.utils.array_scan(to.start, to.start, inclusive=False)
+    scan(to.start, work.scan, inclusive=False)
     launch_over(
         kernels.list_pairs,
         n_owner,

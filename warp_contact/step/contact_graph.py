@@ -4,6 +4,7 @@ import warp as wp
 
 from warp_contact.data.launch import launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.scan import scan
 from warp_contact.data.work import Work
 from warp_contact.kernels.narrow_phase import contact_graph as kernels
 
@@ -15,7 +16,7 @@ def order_by_vertex(model: Model, work: Work) -> None:
     graph.start.zero_()
     outputs = [graph.n_touched, graph.start]
     launch_over(kernels.count_entries, m, inputs=[c.n, c.record], outputs=outputs)
-    wp.utils.array_scan(graph.start, graph.start, inclusive=True)
+    scan(graph.start, work.scan, inclusive=True)
     outputs = [graph.start, graph.entry]
     launch_over(kernels.fill_entries, m, inputs=[c.n, c.record], outputs=outputs)
     outputs = [graph.entry, graph.touched, graph.n_touched]

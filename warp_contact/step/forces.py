@@ -114,7 +114,7 @@ def share_for(rate: float, dt: float) -> float:
 def reach(stages: int, share: float) -> float:
     """Largest dt lambda_max of ``stages`` whose result counts by ``share``.
 
-    One stage has p = 1 - z whatever its share, above 0 up to 1.
+    One stage has p = 1 - z for any share: above 0 for z up to 1.
     """
     return float(stages) if stages < 2 else USED_RANGE * share * (stages * stages + stages)
 

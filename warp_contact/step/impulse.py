@@ -17,13 +17,11 @@ from warp_contact.step.contact_graph import order_by_vertex
 from warp_contact.step.narrow_phase import append_edge_contacts
 
 SWEEPS = 48  # at most; few clusters of contacts last so long
-NEGLIGIBLE = (
-    0.1  # of the tolerance, at the shortest edge: a smaller change affects no other contact
-)
+NEGLIGIBLE = 0.1  # of the tolerance, at the shortest edge: less does not affect other contacts
 
 
 def solve(model: Model, state: State, work: Work) -> None:
-    """Change ``state.v`` by impulses at the contacts found, starting from those of the last step."""
+    """Change ``state.v`` by impulses at the contacts found, starting from the last step's."""
     none = partial(warm_start.forget_edges, work)
     if_any(work.contacts.n, _solve_from_last, model, state, work, otherwise=none)
 

@@ -12,7 +12,7 @@ from warp_contact.step.forces import damp, internal_forces
 def predict(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Damp ``state.v`` in so many stages, kick it, set ``work.x`` = x + h v.
 
-    In this order: after the kick, damping would pass the load of vertices at rest in a contact on to
+    In this order: damping after the kick would pass the load of vertices at rest in a contact on to
     their neighbours before the impulses act, and the state at rest would depend on the damping.
     """
     if damping_stages > 0:

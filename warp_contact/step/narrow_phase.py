@@ -11,6 +11,7 @@ import warp as wp
 
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.scan import scan
 from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.narrow_phase import edges, persistent, vertex_contact, vertices
@@ -99,7 +100,7 @@ def _find_penetrations(model: Model, x: wp.array, work: Work) -> None:
         inputs=[work.mesh, b.verts.list, b.travelled, x],
         outputs=[b.verts.clear_until, n.inside_at],
     )
-    wp.utils.array_scan(n.inside_at, n.inside_at, inclusive=False)
+    scan(n.inside_at, work.scan, inclusive=False)
     launch_over(
         vertices.list_penetrations,
         work.capacity.verts,
@@ -118,7 +119,7 @@ def _find_edges(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool
             inputs=[apart, work.mesh, b.edges.list, b.skin, b.recent, b.travelled, x0, x],
             outputs=[b.edges.clear_until, n.place, n.found, n.crossing_at, n.n_place, n.n_new],
         )
-        wp.utils.array_scan(n.crossing_at, n.crossing_at, inclusive=False)
+        scan(n.crossing_at, work.scan, inclusive=False)
 
     def find_none() -> None:
         n.n_crossing.zero_()
@@ -141,5 +142,5 @@ def _continue_edges(model: Model, x0: wp.array, work: Work) -> None:
         inputs=[work.warm.n_edge, work.warm.edges, work.broad_phase.edges.list, work.mesh, x0],
         outputs=[n.crossing_at, n.place, n.found, n.n_place],
     )
-    wp.utils.array_scan(n.crossing_at, n.crossing_at, inclusive=False)
+    scan(n.crossing_at, work.scan, inclusive=False)
     if_any(n.n_crossing, append_edge_contacts, model, x0, work)

@@ -30,7 +30,7 @@ def step_literal(
 def step_penalty(
     model: Model, state: State, work: Work, damping_stages: int, response: Penalty
 ) -> None:
-    """Penalty forces: they belong to the positions at which they act."""
+    """Penalty forces, at the positions at the start of the step."""
     broad_phase.refresh(model, state.x, state.x, work)
     detect(model, state.x, state.x, work)
     predict(model, state, work, damping_stages)

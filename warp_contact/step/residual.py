@@ -9,7 +9,7 @@ from warp_contact.kernels.surface import residual as kernels
 
 
 def find_gaps(model: Model, x: wp.array, work: Work) -> None:
-    """Set ``surface.residual`` at ``x``, and what of it is to be closed or searched."""
+    """Set ``surface.residual`` at ``x``, and whether any of it is to be closed or searched."""
     work.surface.of_step.zero_()
     add_gaps(model, x, work)
 

@@ -53,7 +53,7 @@ def balance(model: Model, x: wp.array, work: Work, iterations: int) -> None:
 
 
 def bisect(model: Model, x: wp.array, work: Work, iterations: int) -> None:
-    """Move the region to where the search as the paper prints it ends."""
+    """Move the region by the search as the paper prints it."""
     begin(model, x, work)
     s = work.surface
     wp.launch(

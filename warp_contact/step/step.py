@@ -1,7 +1,8 @@
 """One time step of the default response, read from top to bottom.
 
 ``step`` is for bodies that were apart when it began. ``step_overlapping`` is for bodies that may
-have overlapped before, such as those that start inside each other.
+have overlapped before, such as those that start inside each other. The numbers are those of the
+stages in ``kernels/README.md``.
 """
 
 from functools import partial
@@ -19,29 +20,29 @@ from warp_contact.step.motion import drift, predict
 def step(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Advance ``state`` in place by ``work.dt``, symplectic Euler.
 
-    No read-back and no allocation, so that a caller may capture it. ``damping_stages`` is how
-    many the damping takes.
+    No read-back and no allocation, so that a caller may capture it. ``damping_stages`` is
+    the number of stages of the damping.
     """
     fly = partial(in_free_flight, state, work)
-    predict(model, state, work, damping_stages)
-    broad_phase.refresh(model, state.x, work.x, work)
+    predict(model, state, work, damping_stages)  # 1
+    broad_phase.refresh(model, state.x, work.x, work)  # 2
     if_any(work.broad_phase.any_pair, in_contact, model, state, work, otherwise=fly)
 
 
 def in_contact(model: Model, state: State, work: Work) -> None:
     """The rest of the step where bodies may touch."""
-    narrow_phase.find_entered_vertices(model, state.x, work.x, work)
+    narrow_phase.find_entered_vertices(model, state.x, work.x, work)  # 3, 4
     narrow_phase.continue_edges(model, state.x, work)
-    impulse.solve(model, state, work)
+    impulse.solve(model, state, work)  # 5
     # The impulses may have led other edges across each other. If these were left to the closure,
     # they would keep approaching, and its displacements would add energy.
     drift(model, state, work, work.x)
-    narrow_phase.find_entered_edges(model, state.x, work.x, work)
+    narrow_phase.find_entered_edges(model, state.x, work.x, work)  # 3, 4
     impulse.add_edges(model, state, work)
-    impulse.solve_again(model, state, work)
+    impulse.solve_again(model, state, work)  # 5
     impulse.finish(work)
     drift(model, state, work, state.x)
-    surface.close_gaps(model, state, work)
+    surface.close_gaps(model, state, work)  # 8
 
 
 def in_free_flight(state: State, work: Work) -> None:
@@ -71,4 +72,4 @@ def in_overlap(model: Model, state: State, work: Work, iterations: int) -> None:
     impulse.solve_again(model, state, work)
     impulse.finish(work)
     drift(model, state, work, state.x)
-    surface.resolve_overlaps(model, state, work, iterations)
+    surface.resolve_overlaps(model, state, work, iterations)  # 6, 7, 8

@@ -1,4 +1,7 @@
-"""The end of a step: residual overlaps are displaced onto a common surface, without velocity."""
+"""The end of a step: residual overlaps are moved onto a common surface.
+
+These displacements do not become velocities.
+"""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Checks of a USD file: the registered validators, and what they do not look at."""
+"""Checks of a USD file: the registered validators, and what these do not check."""
 
 import numpy as np
 from pxr import Tf, Usd, UsdGeom, UsdUtils, Vt
@@ -26,7 +26,7 @@ def problems(path) -> list[str]:
             if prim.IsA(UsdGeom.PointBased):
                 found += [f"{prim.GetPath()}: {line}" for line in point_based(stage, prim)]
         found += [d.commentary for d in delegate.TakeUncoalescedDiagnostics()]
-        # Only afterwards: the validators take the template of the clips for a lost file and warn.
+        # Last: the validators take the template of the clips for a missing file and warn.
         found += registered(stage)
     except (OSError, Tf.ErrorException) as error:
         found = [str(error)]

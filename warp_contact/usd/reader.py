@@ -38,7 +38,7 @@ def open_stage(path) -> Usd.Stage:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
         raise OSError(f"{path} is not a readable USD file") from error
-    stage.Reload()  # a layer that is still held from before may be out of date
+    stage.Reload()  # a layer that is still open from before may be out of date
     return stage
 
 

@@ -53,12 +53,12 @@ class UsdWriter:
             view: eye and target [m] of a camera to write
             pressure_scale: pressure [Pa] drawn as fully hot; None takes twice the hydrostatic
                 pressure over the scene's size, or without gravity the highest pressure so far
-            resume: go on after frame ``sim.frame`` of the earlier file, which was written with the
+            resume: continue after frame ``sim.frame`` of the earlier file, written with the
                 same arguments; the frames after it are removed
 
         Raises:
             OSError: a file cannot be written, or there is none to resume
-            ValueError: the path is that of another file, or what is there to resume has no such
+            ValueError: the path is that of another file, or the file to resume has no such
                 frame or other bodies
         """
         self.root = root_path(path)
@@ -129,7 +129,7 @@ class UsdWriter:
         self._remove(after=frame)
 
     def _remove(self, after: int = -1) -> None:
-        """Remove the frames after one, and what is unfinished or flattened."""
+        """Remove the frames after one, unfinished files and the flattened file."""
         frames = self._frame(0).parent
         frames.mkdir(parents=True, exist_ok=True)
         kept = {self._frame(frame) for frame in range(after + 1)}

@@ -1,0 +1,73 @@
+"""What is captured allocates nothing and reads nothing back: a GPU would refuse it."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warp_contact import (
+    ContactSurface,
+    NeoHookean,
+    Penalty,
+    PredictedForce,
+    Scene,
+    Simulation,
+    box,
+)
+from warp_contact.frame import stepper
+
+RESPONSES = {
+    "surface": ContactSurface(),
+    "literal": ContactSurface("literal"),
+    "penalty": Penalty(1000.0, 0.5),
+    "predicted": PredictedForce(),
+}
+FORBIDDEN = [
+    (wp, "zeros"),
+    (wp, "empty"),
+    (wp, "full"),
+    (wp, "ones"),
+    (wp, "clone"),
+    (wp, "synchronize"),
+    (wp, "zeros_like"),
+    (wp, "empty_like"),
+    (wp, "synchronize_device"),
+    (wp.array, "numpy"),
+    (wp.utils, "array_scan"),
+    (wp.utils, "array_sum"),
+    (wp.utils, "radix_sort_pairs"),
+]
+
+
+def touching(overlap: float) -> Scene:
+    """Two blocks on a floor, on or in each other."""
+    scene = Scene(friction=0.3)
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    rubber = NeoHookean(5e4, 0.3, 1000.0, 1e-3)
+    scene.add_body(box(0.1, 2), rubber, (0.0, 0.0, 0.0501))
+    scene.add_body(box(0.1, 3), rubber, (0.01, 0.02, 0.1502 - overlap))
+    return scene
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.03])
+@pytest.mark.parametrize("name", RESPONSES)
+def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap):
+    captured = []
+    take_steps = stepper.take_steps
+
+    def guarded(*args) -> None:
+        def refuse(what: str):
+            def refused(*_, **__):
+                raise AssertionError(f"{what} within a capture")
+
+            return refused
+
+        with monkeypatch.context() as m:
+            for owner, attribute in FORBIDDEN:
+                m.setattr(owner, attribute, refuse(attribute))
+            take_steps(*args)
+        captured.append(args)
+
+    monkeypatch.setattr(stepper, "take_steps", guarded)
+    sim = Simulation(touching(overlap), RESPONSES[name])
+    assert any(sim.contact_fields()["pressure"].any() for _ in sim.frames(2))
+    assert captured and np.isfinite(sim.positions()).all()

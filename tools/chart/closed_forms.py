@@ -1,0 +1,225 @@
+"""Panels with a closed form: series springs, Hertz, free collision, mass ladder.
+
+Every body is neo-Hookean, so that the engines that know no other law simulate the same. What is
+held moves in from outside, because most engines cannot start from bodies inside each other. The
+material damps stiffness-proportionally where the state of rest is asked for, with the same
+coefficient for all.
+"""
+
+from functools import cache
+
+import numpy as np
+from engines.task import Failed, Motion, Task
+from verification import collision, hertz, weight
+from verification.columns import Column, Pile
+from verification.setup import G, on_face
+
+import warp_contact as wc
+from chart.laws import STEPS, squeeze
+from chart.panel import Panel, late, sound
+
+Shown = tuple[Task, list[Panel]]
+ZETA = 0.35  # damping ratio of the slowest mode, where bodies come to rest
+
+
+def lowered(scene: wc.Scene, v: float) -> wc.Scene:
+    """The scene, with the held vertices of its last body moving down at v [m/s]."""
+    body = scene.bodies[-1]
+    body.v[body.fixed] = 0.0, 0.0, -v
+    return scene
+
+
+# A1: the upper column, ten times stiffer, is pushed onto the lower one; exact is where two bars of
+# the engine's own law carry the same pressure.
+
+SOFT, STIFF, OVERLAP, SPACE = 1e5, 1e6, 0.1, 0.02  # [Pa], [Pa], [m], [m]
+PUSH, SETTLE, PUSH_FPS = 0.3, 1.0, 60  # [s], [s], [1/s]
+SPEED = 10.0  # of the waves in both columns [m/s]
+CELLS, QUICK_CELLS = ((3, 3, 6), (4, 4, 6)), ((2, 2, 4), (3, 3, 4))
+
+
+def springs(quick: bool) -> Shown:
+    """A1."""
+    push, beta = round(PUSH * PUSH_FPS), 2.0 * ZETA / (0.5 * np.pi * SPEED)
+    columns = [
+        Column(young, 1.0, young / SPEED**2, cells, damping=beta)
+        for young, cells in zip((SOFT, STIFF), QUICK_CELLS if quick else CELLS, strict=True)
+    ]
+
+    def build() -> wc.Scene:
+        scene = Pile(columns, SPACE, clamped=True).build(wc.NeoHookean)
+        return lowered(scene, (OVERLAP + SPACE) * PUSH_FPS / push)
+
+    task = Task(build, PUSH_FPS, push + round(SETTLE * PUSH_FPS), SOFT / 16.0, stop=push)
+    title = "A1 series springs 1:10\nplace of the surface [of the overlap]"
+    return task, [Panel("A1", title, place)]
+
+
+def place(task: Task, motion: Motion) -> float:
+    """How far the mean heights of both faces are off, the worse of the two [of the overlap]."""
+    whole, _ = sound(task, motion)
+    exact, worst = meeting(motion.law), 0.0
+    for k, (body, part) in enumerate(zip(task.scene().bodies, whole.parts, strict=True)):
+        z = motion.x[late(task), part, 2][:, on_face(body.mesh, 2, 1 - 2 * k)]
+        worst = max(worst, abs(float(z.mean()) - exact) / OVERLAP)
+    return worst
+
+
+@cache
+def meeting(law: str) -> float:
+    """Height at which both columns carry the same pressure [m]."""
+    soft, stiff = (body.material.lame() for body in springs(True)[0].scene().bodies)
+    p = 0.0
+    for _ in range(STEPS):
+        gap = 2.0 - OVERLAP - squeeze(p, *soft, law) - squeeze(p, *stiff, law)
+        p -= gap / (1.0 / SOFT + 1.0 / STIFF)
+    return squeeze(p, *soft, law)
+
+
+# A3: the cap of a sphere pressed onto a plane by a given depth.
+
+FINE, QUICK_FINE = 2, 1  # elements across the radius of contact
+HERTZ_PUSH, HERTZ_SETTLE, HERTZ_FPS = 0.01, 0.015, 1000  # [s], [s], [1/s]
+HERTZ_SPACE = 1e-4  # at the start [m]
+E_STAR = hertz.modulus(hertz.YOUNG)
+CONTACT = hertz.contact_radius(hertz.LOADS[1], hertz.RADIUS, E_STAR)  # radius [m]
+
+
+def pressed(quick: bool) -> Shown:
+    """A3."""
+    n = QUICK_FINE if quick else FINE
+    depth = CONTACT**2 / hertz.RADIUS
+    push = round(HERTZ_PUSH * HERTZ_FPS)
+
+    def build() -> wc.Scene:
+        scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
+        scene.add_plane((0.0, 0.0, 1.0), 0.0)
+        mesh = hertz.cap(hertz.RADIUS, CONTACT / n, hertz.RINGS[n])
+        omega = 0.5 * np.pi * hertz.pressure_wave(hertz.YOUNG) / hertz.HEIGHT
+        rubber = wc.NeoHookean(hertz.YOUNG, hertz.POISSON, hertz.DENSITY, 2.0 * ZETA / omega)
+        held = mesh.vertices[:, 2] > 0.999 * hertz.HEIGHT
+        scene.add_body(mesh, rubber, (0.0, 0.0, HERTZ_SPACE), fixed=held)
+        return lowered(scene, (depth + HERTZ_SPACE) * HERTZ_FPS / push)
+
+    frames = push + round(HERTZ_SETTLE * HERTZ_FPS)
+    task = Task(build, HERTZ_FPS, frames, hertz.YOUNG * CONTACT / n, stop=push)
+    title = f"A3 Hertz, {n} element(s) across\npressure at the middle [of exact]"
+    return task, [Panel("A3", title, peak)]
+
+
+def peak(task: Task, motion: Motion) -> float:
+    """Pressure at the middle against Hertz at the imposed depth.
+
+    At rest contact balances the internal forces, so the pressure follows from positions. The held
+    plane above makes the body stiffer, and the mesh has its error too: whoever comes to rest on it
+    meets at that floor, not at zero.
+    """
+    _, solid = sound(task, motion)
+    body = task.scene().bodies[0]
+    force = np.mean([solid.forces(x) for x in motion.x[late(task)]], axis=0)
+    under = hertz.on_ball(body)
+    lowest = np.flatnonzero(under)[np.hypot(*body.mesh.vertices[under, :2].T).argmin()]
+    p = -force[lowest, 2] / areas(body.mesh)[lowest]
+    p0 = 2.0 * E_STAR * CONTACT / (np.pi * hertz.RADIUS)
+    return abs(float(p) / p0 - 1.0)
+
+
+def areas(mesh: wc.TetMesh) -> np.ndarray:
+    """A third of the surface around each vertex [m^2]."""
+    a, b, c = np.moveaxis(mesh.vertices[mesh.surface], 1, 0)
+    third = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+    return np.bincount(mesh.surface.ravel(), np.repeat(third, 3), minlength=len(mesh.vertices))
+
+
+# A6: two undamped free blocks, the second ten times as dense, meet head-on.
+
+DENSER = 10.0
+FREE_FPS, FREE_TIME = 240, 0.25  # [1/s], [s]
+
+
+def free(quick: bool) -> Shown:
+    """A6: momentum and energy; the quick run is the same."""
+    del quick
+
+    def build() -> wc.Scene:
+        return collision.thrown((3, 5), "head-on", DENSER)
+
+    title = "A6 free collision 1:10\n{} [of that at the start]"
+    panels = [
+        Panel("A6p", title.format("change of momentum"), drift),
+        Panel("A6e", title.format("energy gained or lost"), work),
+    ]
+    return Task(build, FREE_FPS, round(FREE_TIME * FREE_FPS), 500.0), panels
+
+
+def drift(task: Task, motion: Motion) -> float:
+    """Largest change of momentum after any frame, of sum m |v| at the start."""
+    m = met(task, motion)[0].mass
+    p = np.einsum("i,fij->fj", m, motion.v.astype(float))
+    scale = m @ np.linalg.norm(motion.v[0], axis=1)
+    return float(np.linalg.norm(p - p[0], axis=1).max() / scale)
+
+
+def work(task: Task, motion: Motion) -> float:
+    """Change of kinetic and elastic energy, averaged over the end: integrators lag by half a step.
+
+    Undamped and without friction exact is none; a loss counts as well as a gain.
+    """
+    whole, solid = met(task, motion)
+
+    def energy(k: int) -> float:
+        kinetic = 0.5 * whole.mass @ (motion.v[k].astype(float) ** 2).sum(axis=1)
+        return kinetic + solid.energy(motion.x[k])
+
+    end = range(task.frames + 1 - task.frames // 3, task.frames + 1)
+    return abs(float(np.mean([energy(k) for k in end])) / energy(0) - 1.0)
+
+
+def met(task: Task, motion: Motion):
+    """As ``sound``; ``Failed`` as well unless the blocks have met and parted."""
+    found = whole, _ = sound(task, motion)
+    first, second = (motion.v[-1, part, 2].mean() for part in whole.parts)
+    if not second - first > 0.0:
+        raise Failed("the blocks do not part")
+    return found
+
+
+# A7m: a light cube carries one a hundred times as dense; they start where linear bars would rest,
+# and their damping takes 1.25 s until less than 0.01 % of the weight is left of that error.
+
+RATIO = 100.0
+EDGE, LIGHT = weight.EDGE, weight.DENSITY  # [m], [kg/m^3]
+LADDER_FPS, LADDER_TIME = 240, 1.5  # [1/s], [s]
+LADDER_ZETA = 0.1  # a small part of the rate at which the light cube alone would be damped
+
+
+def ladder(quick: bool) -> Shown:
+    """A7m; the quick run is the same."""
+    del quick
+    young = 20.0 * RATIO * LIGHT * G * EDGE  # 5 % of strain
+    omega = np.sqrt(young / (RATIO * LIGHT)) / EDGE
+    pile = weight.cubes(RATIO, young, 2.0 * LADDER_ZETA / omega)
+
+    def build() -> wc.Scene:
+        return pile.build(wc.NeoHookean)
+
+    def start(scene: wc.Scene) -> np.ndarray:
+        return np.concatenate(pile.static(scene))
+
+    frames = round(LADDER_TIME * LADDER_FPS)
+    task = Task(build, LADDER_FPS, frames, 0.1 * young * EDGE, start=start)
+    title = f"A7m heavy on light 1:{RATIO:g}\nforce and its ripple [of the weight]"
+    return task, [Panel("A7m", title, carried)]
+
+
+def carried(task: Task, motion: Motion) -> float:
+    """Root mean square over the end of what is off in the force on the light cube.
+
+    The force is what its stresses hand to its held base, less its own weight.
+    """
+    whole, solid = sound(task, motion)
+    light, heavy = whole.parts
+    base = task.scene().bodies[0].fixed
+    own, load = whole.mass[light][~base].sum() * G, whole.mass[heavy].sum() * G
+    forces = [-solid.forces(x)[light][base, 2].sum() - own for x in motion.x[late(task)]]
+    return float(np.sqrt(np.mean(np.square(np.array(forces) / load - 1.0))))

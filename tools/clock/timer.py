@@ -1,0 +1,114 @@
+"""A timer of every operation of a step, which runs uncaptured meanwhile.
+
+The stage of an operation is the module of ``warp_contact/step`` that asks for it, the innermost
+one. A launch counts net of the same launch without a thread, a memory operation net of the same on
+one element, both just before it: what remains is the work itself, without Python. On the CPU the
+clock is that of the thread, which stands still while others have the core.
+"""
+
+import sys
+from contextlib import ExitStack
+from time import perf_counter, thread_time
+from typing import NamedTuple
+from unittest import mock
+
+import warp as wp
+
+from clock.memory import held
+
+ROOM = "warp_contact.step."
+OTHER = "other"  # asked for outside of a step
+ALONE = "step_alone"  # by step.py itself; "step" is the whole
+MEMORY = {  # with the same where there is next to nothing to do
+    (wp, "copy"): lambda one, other, tree: wp.copy(one, other),
+    (wp.array, "zero_"): lambda one, other, tree: one.zero_(),
+    (wp.array, "fill_"): lambda one, other, tree: one.fill_(1),
+    (wp.utils, "array_scan"): lambda one, other, tree: wp.utils.array_scan(one, other),
+    (wp.Bvh, "refit"): lambda one, other, tree: tree.refit(),
+}
+
+
+class Operation(NamedTuple):
+    """One operation."""
+
+    stage: str  # a module of ``warp_contact/step``, or ``OTHER``
+    name: str  # of the kernel or memory operation
+    bytes: int  # of the arrays that it was given, what several of them share once
+    ms: float
+
+
+class StageTimer:
+    """Keeps a record of every operation while it is entered, in order, as ``operations``."""
+
+    def __init__(self, device: wp.Device):
+        """``device`` is that of the step."""
+        self.operations: list[Operation] = []
+        self._device = device
+        self._inside = False
+        self._patches = ExitStack()
+        one, other = (wp.zeros(1, dtype=int, device=device) for _ in range(2))
+        tree = wp.Bvh(*(wp.zeros(1, dtype=wp.vec3, device=device) for _ in range(2)))
+        self._few = one, other, tree
+
+    def __enter__(self):
+        """Put the timer between the step and Warp."""
+        patches = {(wp, "launch"): self._launch(wp.launch)}
+        for (owner, name), small in MEMORY.items():
+            patches[owner, name] = self._operation(name, getattr(owner, name), small)
+        for place, function in patches.items():
+            self._patches.enter_context(mock.patch.object(*place, function))
+        return self
+
+    def __exit__(self, *error):
+        """Take the timer out again."""
+        self._patches.close()
+
+    def _launch(self, launch):
+        def call(kernel, *args, **kwargs):
+            command = launch(kernel, *args, record_cmd=True, **kwargs)
+            if command is None:  # no thread to run
+                return
+            bounds = command.params[0]
+            command.set_dim(0)
+            command.launch()
+            empty = self._ms(command.launch)
+            command.params[0] = bounds
+            given = *kwargs.get("inputs", ()), *kwargs.get("outputs", ())
+            self._note(kernel.key, given, self._ms(command.launch) - empty)
+
+        return call
+
+    def _operation(self, name: str, function, small):
+        def call(*args, **kwargs):
+            if self._inside:  # one operation may be made of others
+                return function(*args, **kwargs)
+            self._inside = True
+            try:
+                small(*self._few)
+                empty = self._ms(lambda: small(*self._few))
+                self._note(name, args, self._ms(lambda: function(*args, **kwargs)) - empty)
+            finally:
+                self._inside = False
+
+        return call
+
+    def _ms(self, function) -> float:
+        clock = thread_time if self._device.is_cpu else perf_counter
+        start = clock()
+        function()
+        if not self._device.is_cpu:
+            wp.synchronize_device(self._device)
+        return 1e3 * (clock() - start)
+
+    def _note(self, name: str, given: tuple, ms: float) -> None:
+        self.operations.append(Operation(_stage(), name, held(given), ms))
+
+
+def _stage() -> str:
+    frame = sys._getframe(1)
+    while frame:
+        module = frame.f_globals.get("__name__", "")
+        if module.startswith(ROOM):
+            return {"step": ALONE}.get(stage := module.removeprefix(ROOM), stage)
+        frame = frame.f_back
+    return OTHER

@@ -1,0 +1,163 @@
+"""Newton's solvers: vertex block descent, and extended position-based dynamics.
+
+Knobs of both: ``steps`` in a frame and ``iterations``. Its small-strain Lame parameters and its
+stable neo-Hookean energy are those of this package.
+
+``vbd``: implicit Euler, contact at a margin, a penalty inside it. Knobs: ``contact`` stiffness over
+E edge, and the ``margin`` over an edge at which contact begins. Its contact knows triangles and
+edges, and takes all bodies as one mesh. It is looked for within two margins; between two looks no
+vertex moves further than 0.85 margins. Its damping sees the rate of F^T F: for a stress 2 beta mu
+of the strain rate it takes beta mu / 2, and it has no part for the volume.
+
+``xpbd``: constraints of tets, relaxed all at once. Knobs: ``relaxation`` and ``radius``. Between
+soft bodies its contact knows particles only: balls about the vertices, of a radius over a mean edge
+of the finest body. Two of one body that are closer than two radii push each other apart at rest,
+too: in cells of ``box`` from 0.44 on, in sheets one layer thick always. Its damping of a constraint
+is the coefficient over the modulus: that of the shape is beta as in the scene, that of the volume
+beta mu / lambda. Its constraints tr(F^T F) - 3 and det F - 1 both see no more than the change of
+volume at small strains; forces are read as those of the law that the scene asks for.
+"""
+
+import sys
+
+import newton
+import numpy as np
+import warp as wp
+from job import CannotDo, main, mean_edge
+
+wp.config.log_level = wp.LOG_WARNING
+
+POINT = 1e-3  # radius of a particle over a mean edge, where the radius is no knob
+
+
+@wp.kernel
+def drive(v: wp.array[wp.vec3], dt: float, q: wp.array[wp.vec3]):
+    """Move held particles, whose ``v`` [m/s] is not zero, by a step."""
+    i = wp.tid()
+    q[i] = q[i] + dt * v[i]
+
+
+def vbd(scene, job: dict, setting: dict) -> "Engine":
+    """The engine with vertex block descent."""
+    edge = mean_edge(scene)
+    margin = setting["margin"] * edge
+    model = build(scene, job["friction"], 0.5, setting["contact"], POINT * edge)
+    solver = newton.solvers.SolverVBD(
+        model,
+        iterations=setting["iterations"],
+        particle_enable_self_contact=len(scene.young) > 1,
+        particle_self_contact_margin=margin,
+        particle_self_contact_gap=margin,
+        particle_enable_tile_solve=False,
+    )
+    return Engine(scene, job, setting, model, solver)
+
+
+def xpbd(scene, job: dict, setting: dict) -> "Engine":
+    """The engine with extended position-based dynamics."""
+    if scene.lame[:, 1].min() <= 0.0:
+        raise CannotDo("its tets have no forces where the second Lame parameter is zero")
+    radius = (POINT if len(scene.young) == 1 else setting["radius"]) * mean_edge(scene)
+    model = build(scene, job["friction"], 1.0, 1.0, radius)
+    solver = newton.solvers.SolverXPBD(
+        model,
+        iterations=setting["iterations"],
+        soft_body_relaxation=setting["relaxation"],
+        soft_contact_relaxation=setting["relaxation"],
+    )
+    return Engine(scene, job, setting, model, solver)
+
+
+def build(scene, friction: float, damping: float, contact: float, radius: float) -> newton.Model:
+    """A coloured model with the masses of the scene; a mass of zero holds a particle.
+
+    Args:
+        scene: arrays of a job
+        friction: of planes and particles [-]; the solvers mix both
+        damping: coefficient of a tet, over beta mu [-]
+        contact: stiffness over the smallest modulus and an edge of the finest body [-]
+        radius: of the particles [m]
+    """
+    builder = newton.ModelBuilder(gravity=tuple(scene.gravity.tolist()))
+    for k in range(len(scene.young)):
+        mine = scene.body == k
+        first = int(np.flatnonzero(mine)[0])
+        mu, lam = scene.lame[k].tolist()
+        builder.add_soft_mesh(
+            pos=wp.vec3(),
+            rot=wp.quat_identity(),
+            scale=1.0,
+            vel=wp.vec3(),
+            vertices=[wp.vec3(*p) for p in scene.rest[mine].tolist()],
+            indices=(scene.tets[scene.tet_body == k] - first).ravel().tolist(),
+            density=float(scene.density[k]),
+            k_mu=mu,
+            k_lambda=lam,
+            k_damp=damping * float(scene.damping[k]) * mu,
+            particle_radius=radius,
+        )
+    builder.particle_mass = np.where(scene.fixed, 0.0, scene.mass).tolist()
+    stiffness = contact * float(scene.young.min()) * mean_edge(scene)
+    config = newton.ModelBuilder.ShapeConfig(ke=stiffness, kd=0.0, mu=friction)
+    for *n, h in scene.planes.tolist():
+        builder.add_shape_plane(plane=(*n, -h), width=0.0, length=0.0, cfg=config)
+    builder.color()
+    model = builder.finalize(device="cpu")
+    model.soft_contact_ke, model.soft_contact_kd = stiffness, 0.0
+    model.soft_contact_mu = model.particle_mu = friction
+    return model
+
+
+class Engine:
+    """Steps a model with a solver, frame by frame as a captured graph."""
+
+    def __init__(self, scene, job: dict, setting: dict, model: newton.Model, solver):
+        """Lay out the states; ``solver`` steps from the one to the other."""
+        self.model, self.solver = model, solver
+        self.steps = setting["steps"]
+        self.dt = 1.0 / (job["fps"] * self.steps)
+        self.now, self.then = model.state(), model.state()
+        held = np.where(scene.fixed[:, None], scene.v, 0.0).astype(np.float32)
+        for state in (self.now, self.then):
+            state.particle_q.assign(scene.x.astype(np.float32))
+            state.particle_qd.assign((scene.v - held).astype(np.float32))
+        self.held = wp.array(held, dtype=wp.vec3, device="cpu")
+        self.control = model.control()
+        self.pipeline = newton.CollisionPipeline(model)
+        self.contacts = self.pipeline.contacts()
+        self.graph = None
+
+    def step_frame(self) -> None:
+        """One frame; the first is stepped as it is and captured for the others."""
+        if self.graph is None:
+            self._steps()
+            with wp.ScopedCapture(device="cpu") as capture:
+                self._steps()
+            self.graph = capture.graph
+        else:
+            wp.capture_launch(self.graph)
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [m] and velocities [m/s]."""
+        return self.now.particle_q.numpy().copy(), self.now.particle_qd.numpy().copy()
+
+    def halt(self) -> None:
+        """Held particles stand still from now on."""
+        self.held.zero_()
+
+    def _steps(self) -> None:
+        a, b = self.now, self.then
+        for _ in range(self.steps):
+            a.clear_forces()
+            inputs = [self.held, self.dt]
+            wp.launch(drive, dim=self.model.particle_count, inputs=inputs, outputs=[a.particle_q])
+            self.pipeline.collide(a, self.contacts)
+            self.solver.step(a, b, self.control, self.contacts, self.dt)
+            a, b = b, a
+        if a is not self.now:  # an odd number of steps
+            wp.copy(self.now.particle_q, a.particle_q)
+            wp.copy(self.now.particle_qd, a.particle_qd)
+
+
+if __name__ == "__main__":
+    main({"vbd": vbd, "xpbd": xpbd}[sys.argv[2]])

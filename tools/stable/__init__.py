@@ -1,1 +1,0 @@
-"""The scenes and sweeps of ``tools/stability.py``, one file each, and what judges them."""

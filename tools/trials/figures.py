@@ -1,0 +1,86 @@
+"""The scenes of the paper as they are, the sphere squeezed further; blocks that no one chose.
+
+``tilts`` are the collisions of ``verification/collision.py``, with rotation, place, cells and
+stiffness drawn anew for each number. Corners slide over facets that they bend, and pass each other
+tip on tip.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from verification import collision
+
+import warp_contact as wc
+from trials.setting import Case, Setting, case
+from warp_contact import scenes
+
+FPS = 60.0
+SQUEEZES = 0.7, 0.5, 0.3, 0.15  # of the sphere's diameter
+SPEED = 0.1  # of the upper cube [m/s]
+REST = 0.2  # between squeeze and release [s]
+LIMIT = 600.0  # seconds that the larger scenes may take
+SIDE_BY_SIDE = (0, 1), (2, 3)  # pairs of bodies
+
+DRAWS, QUICK_DRAWS = 180, 12
+CELLS = (3, 3), (2, 5), (4, 6), (8, 8)
+ASIDE = 0.03  # the largest shift along x and y [m]
+
+
+def cases(quick: bool) -> Iterator[Case]:
+    """B4 to B7; the quick run is shorter and takes fewer fruits."""
+    seconds, fraction = (0.5, 0.05) if quick else (2.0, 0.15)
+    on_sheet = (0, 1), (0, 2), (0, 3)
+    yield case("B4 three cubes on a membrane", paper, "cubes_on_membrane", seconds, on_sheet)
+    for part in SQUEEZES[:2] if quick else SQUEEZES:
+        yield case(f"B5 sphere squeezed to {part:.0%} and released", squeezed, part)
+    for mu in (0.3, 0.0):
+        name = f"B6 stack of nine membranes, friction {mu:g}"
+        yield case(name, paper, "membrane_stack", 0.25 * seconds, limit=LIMIT, friction=mu)
+    name = f"B7 bowl, {fraction:.0%} of the fruit"
+    yield case(name, paper, "bowl", 0.25 * seconds, (), limit=LIMIT, fraction=fraction)
+    yield case("Fig. 1 arches on slabs", paper, "sampling", seconds, SIDE_BY_SIDE, limit=LIMIT)
+    yield case("Fig. 6 two pairs of blocks", blocks, seconds)
+
+
+def tilts(quick: bool) -> Iterator[Case]:
+    """So many draws; the number of each is its seed."""
+    for k in range(QUICK_DRAWS if quick else DRAWS):
+        yield case(f"B2 blocks at random tilt {k}", collide, k)
+
+
+def paper(name: str, seconds: float, pairs: tuple | None = None, **options) -> Setting:
+    """A scene as it is; ``options`` of its ``build``."""
+    return Setting(scenes.load(name).build(**options), seconds, FPS, pairs=pairs)
+
+
+def blocks(seconds: float) -> Setting:
+    """Blocks that start in each other; their outer ends are held."""
+    scene = scenes.load("two_bodies").build()
+    return Setting(scene, seconds, FPS, pairs=SIDE_BY_SIDE, recovers=True)
+
+
+def squeezed(part: float) -> Setting:
+    """The upper cube comes down until the gap is a part of the diameter, waits and goes up."""
+    module = scenes.load("squeezed_sphere")
+    scene = module.build(speed=SPEED)
+    upper = scene.bodies[2]
+    held = np.flatnonzero(upper.fixed)
+    gap = float(upper.x[:, 2].min()) - module.EDGE
+    down = (gap - part * 2.0 * module.RADIUS) / SPEED
+
+    def drive(sim: wc.Simulation) -> None:
+        waiting, up = sim.time >= down, sim.time >= down + REST
+        sim.set_velocity(upper, (0.0, 0.0, SPEED * (up - (not waiting))), held)
+
+    return Setting(scene, 2.0 * down + REST, FPS, drive=drive)
+
+
+def collide(k: int) -> Setting:
+    """Draw ``k``."""
+    rng = np.random.default_rng(k)
+    cells = CELLS[rng.integers(len(CELLS))]
+    ratio = rng.choice(collision.RATIOS)
+    angles = rng.uniform(0.0, 90.0, 3)
+    shift = np.array([*rng.uniform(-ASIDE, ASIDE, 2), 0.0])
+    scene = collision.build(*cells, ratio, "tilted shifted", angles=angles, shift=shift)
+    return Setting(scene, collision.DURATION, collision.FPS, pairs=())

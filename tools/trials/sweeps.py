@@ -1,0 +1,123 @@
+"""Sweeps of two numbers to the point of failure, on scenes of two small bodies."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+import warp_contact as wc
+from trials import outcome
+from trials.setting import NONE, Setting, body, setting, soft
+
+COARSE, FINE = 5, 11  # cells along each side
+EDGE = 0.1  # of a block [m]
+FRAMES = 60
+MOST_STEPS = 600, 6000  # of a cell in a quick and in a full run; a run that is cut says so
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What is swept, and how."""
+
+    title: str
+    x_name: str  # with its unit
+    y_name: str
+    x: tuple[float, float]  # first and last value, spaced by equal factors
+    y: tuple[float, float]
+    build: Callable[[float, float], Setting]  # of a cell
+    # Where something else than contact decides: its name, and y at each x.
+    limit: tuple[str, Callable[[np.ndarray], np.ndarray]] | None = None
+
+    def axes(self, quick: bool) -> tuple[np.ndarray, np.ndarray]:
+        """The values of both."""
+        n = COARSE if quick else FINE
+        return np.geomspace(*self.x, n), np.geomspace(*self.y, n)
+
+
+def step_stiffness(step: float, young: float) -> Setting:
+    """Two blocks collide at 1 m/s with a fixed step."""
+    blocks = []
+    for k, sign in enumerate((-1.0, 1.0)):
+        place = 0.004 * k, 0.003 * k, sign * (0.5 * EDGE + 0.002)
+        blocks.append(body(wc.box(EDGE, 2 + k), soft(young), place, v=-0.5 * sign))
+    return fixed_steps(*blocks, seconds=0.06, step=step)
+
+
+def mass_stiffness(mass: float, young: float) -> Setting:
+    """A block falls on one that is held; mass and stiffness of the upper over that of the lower.
+
+    At the largest mass ratio the pressure at rest is as large as the lower block's modulus. The
+    weight of the upper block over its section is mass / (1e4 young) of its own moduli.
+    """
+    base = 1e4 * 1000.0 * 9.81 * EDGE
+    low = body(wc.box(EDGE, 2), soft(base), fixed="base")
+    high = body(wc.box(EDGE, 3), soft(base * young, 1000.0 * mass), (0.004, 0.003, EDGE + 2e-3))
+    return setting(low, high, seconds=0.1, fps=FRAMES / 0.1)
+
+
+def overlap_thickness(overlap: float, thick: float) -> Setting:
+    """A block starts in a plate; both lengths as parts of its edge.
+
+    Where the overlap is above the thickness it sticks out of the far face.
+    """
+    plate = body(wc.box((2.0 * EDGE, 2.0 * EDGE, thick * EDGE), (4, 4, 1)))
+    block = body(wc.box(EDGE, 3), at=(0.004, 0.003, (0.5 * thick + 0.5 - overlap) * EDGE))
+    run = {"seconds": 0.3, "fps": FRAMES / 0.3, "recovers": True}
+    return setting(plate, block, gravity=NONE, friction=0.0, **run)
+
+
+def speed_step(speed: float, step: float) -> Setting:
+    """A block hits a thin plate that is held, with a fixed step."""
+    thick, length = 0.004, 0.04
+    plate = body(wc.box((EDGE, EDGE, thick), (3, 3, 1)), soft(1e4), fixed=True)
+    place = 0.003, 0.002, 0.5 * (thick + length) + 0.6 * thick
+    block = body(wc.box(length, 2), soft(1e4), place, v=-speed)
+    seconds = min(max(3.0 * length / speed, 10.0 * step), 600.0 * step)
+    return fixed_steps(plate, block, seconds=seconds, step=step)
+
+
+def fixed_steps(*bodies: dict, seconds: float, step: float) -> Setting:
+    """About ``FRAMES`` frames of equal steps of ``step`` [s], without gravity."""
+    substeps = max(1, round(seconds / FRAMES / step))
+    run = {"seconds": seconds, "fps": 1.0 / (step * substeps), "substeps": substeps}
+    return setting(*bodies, gravity=NONE, **run)
+
+
+SWEEPS = {
+    "step": Sweep(
+        "two blocks collide at 1 m/s, fixed step",
+        *("step [s]", "Young's modulus [Pa]", (1e-4, 1e-2), (1e3, 1e7), step_stiffness),
+    ),
+    "ratio": Sweep(
+        "a block falls on another, step left to the solver",
+        *("mass ratio", "stiffness ratio", (1.0, 1e4), (1e-4, 1e4), mass_stiffness),
+        # Between the cells where it goes inside out, also if held at its base, and those where not.
+        limit=("the upper block's weight is 25 of its moduli", lambda mass: mass / 2.5e5),
+    ),
+    "depth": Sweep(
+        "a block starts in a plate",
+        *("overlap at the start [of an edge]", "thickness [of an edge]"),
+        *((0.01, 0.5), (0.03, 1.0), overlap_thickness),
+    ),
+    "speed": Sweep(
+        "a block hits a plate of 0.004 m, fixed step",
+        *("speed [m/s]", "step [s]", (0.1, 100.0), (1e-4, 1e-2), speed_step),
+    ),
+}
+
+
+def frontier(grid: list[list[str]]) -> list[tuple[tuple, tuple]]:
+    """The sides between a cell that is fine and one that is not: (x, x), (y, y) of their ends."""
+    fine = np.array(grid) == outcome.FINE
+    right = np.argwhere(fine[:, 1:] != fine[:, :-1]).tolist()
+    above = np.argwhere(fine[1:] != fine[:-1]).tolist()
+    sides = [((i + 0.5, i + 0.5), (j - 0.5, j + 0.5)) for j, i in right]
+    return sides + [((i - 0.5, i + 0.5), (j + 0.5, j + 0.5)) for j, i in above]
+
+
+def limit_line(s: Sweep, xs: np.ndarray, ys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The line of the sweep's limit in cells, x and y, as far as it lies on the map."""
+    last = len(ys) - 1
+    y = last * np.log(s.limit[1](xs) / ys[0]) / np.log(ys[-1] / ys[0])
+    on = (y >= -0.5) & (y <= last + 0.5)
+    return np.flatnonzero(on), y[on]

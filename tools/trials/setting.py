@@ -69,13 +69,19 @@ def body(mesh: wc.TetMesh, material=None, at=NONE, turn=(0.0, 0.0, 0.0, 1.0), v=
     return given | {"velocity": v} | more
 
 
+def scene(*bodies: dict, gravity=DOWN, friction=0.3, planes=()) -> wc.Scene:
+    """Bodies on the half-spaces above the planes through the origin with these normals."""
+    made = wc.Scene(gravity, friction=friction)
+    for normal in planes:
+        made.add_plane(normal)
+    for arguments in bodies:
+        made.add_body(**arguments)
+    return made
+
+
 def setting(
     *bodies: dict, seconds: float, gravity=DOWN, friction=0.3, planes=(), **watched
 ) -> Setting:
-    """Bodies on the half-spaces above the ``planes`` through the origin; see ``Setting``."""
-    scene = wc.Scene(gravity, friction=friction)
-    for normal in planes:
-        scene.add_plane(normal)
-    for arguments in bodies:
-        scene.add_body(**arguments)
-    return Setting(scene, seconds, **watched)
+    """The scene of these bodies; see ``Setting``."""
+    made = scene(*bodies, gravity=gravity, friction=friction, planes=planes)
+    return Setting(made, seconds, **watched)

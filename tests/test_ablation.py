@@ -16,8 +16,8 @@ from warp_contact.step import search
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
 import ablation
-from parts.off import number
-from parts.table import PARTS, Part
+from parts.cases import Case, Quantity
+from parts.table import PARTS, Part, number
 
 OWNERS = constraint, edge_contact, search, step_bounds, stepper, tangent, vertex_contact
 
@@ -27,13 +27,9 @@ def part():
     """A part of which a figure depends on a bound: ``part(with, without, least)``."""
 
     def make(kept: float, off: float, least: float = 0.0) -> Part:
-        bound = search.SEARCH_BOUND
-
-        def case() -> dict[str, float]:
-            """A number."""
-            return {"figure": kept if search.SEARCH_BOUND == bound else off}
-
-        return Part("name", number(search, "SEARCH_BOUND", 1.0), case, "figure", least)
+        figure, bound = Quantity("figure", least), search.SEARCH_BOUND
+        case = Case("case", lambda: {figure: kept if search.SEARCH_BOUND == bound else off})
+        return Part("name", number(search, "SEARCH_BOUND", 1.0), case, figure)
 
     return make
 
@@ -58,15 +54,10 @@ def test_a_figure_that_is_not_finite_is_worse_than_any(part, off):
 def test_a_run_that_stops_early_is_worse_than_any(part):
     from warp_contact import SimulationError
 
-    with mock.patch.object(ablation, "figures", lambda case: {"figure": 1.0}):
-        stops = Part(
-            "name",
-            number(search, "SEARCH_BOUND", 1.0),
-            mock.Mock(side_effect=SimulationError("not finite")),
-            "figure",
-            0.0,
-        )
-        assert ablation.compare(stops).ratio == math.inf
+    figure = Quantity("figure", 0.0)
+    case = Case("case", mock.Mock(side_effect=[{figure: 1.0}, SimulationError("not finite")]))
+    stops = Part("name", number(search, "SEARCH_BOUND", 1.0), case, figure)
+    assert ablation.compare(stops).ratio == math.inf
 
 
 def test_the_exit_status_tells_of_a_part_that_nothing_misses(part, monkeypatch, capsys):
@@ -113,13 +104,13 @@ def test_a_switch_is_refused_where_there_is_no_such_part_or_it_is_off():
 @pytest.mark.parametrize("name", ["entry", "deep end"])
 def test_a_constant_of_a_kernel_is_another_one_and_then_the_same_again(name):
     part = PARTS[name]
-    before = part.case()[part.figure]
+    before = part.case.run()[part.figure]
     with part.off():
-        without_it = part.case()[part.figure]
+        without_it = part.case.run()[part.figure]
     print(before, without_it)
     # 1 % of an edge was seen, and 0.26 %, each at one place and in many frames.
     assert before < 0.1 < without_it
-    assert part.case()[part.figure] == before
+    assert part.case.run()[part.figure] == before
 
 
 def test_tilted_blocks_need_contacts_of_edges():

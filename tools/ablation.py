@@ -13,37 +13,37 @@ the table: the broad and the narrow phase, the impulses, and eq. (1), which only
 search has to look.
 """
 
-import argparse
 import math
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
-import warp as wp
+from measure.report import Table
+from measure.run import command_line, one_of
+from parts.cases import Case, Found
 from parts.table import PARTS, Part
 
 from warp_contact import SimulationError
 
 WORTH = 1.5  # without over with: a part below it is not worth its lines
-WIDTHS = 34, 33, 41, 9, 9, 9  # of the columns [characters]
-COLUMNS = "part", "case", "figure", "with", "without", "ratio"
+WIDTHS = {"part": 34, "case": 33, "figure": 41, "with": 9, "without": 9, "ratio": 9}
+TABLE = Table(**WIDTHS, said=0)
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """One line of the table."""
 
     part: Part
-    kept: float
-    off: float
+    kept: float  # the figure with the part
+    off: float  # and without
 
     @property
     def ratio(self) -> float:
         """Without over with; a run that ends early or is not finite is infinitely worse."""
         if not math.isfinite(self.off):
             return math.inf
-        return max(self.off, self.part.least) / max(self.kept, self.part.least)
+        least = self.part.figure.least
+        return max(self.off, least) / max(self.kept, least)
 
     @property
     def worth(self) -> bool:
@@ -53,27 +53,20 @@ class Line:
     def __str__(self):
         """Its columns."""
         numbers = (f"{x:.3g}" for x in (self.kept, self.off, self.ratio))
-        cells = self.part.name, name(self.part.case), self.part.figure, *numbers
-        line = "  ".join(c.ljust(w) for c, w in zip(cells, WIDTHS, strict=True))
-        return line + ("" if self.worth else "WORSENS NOTHING")
+        names = self.part.name, self.part.case.title, self.part.figure.name
+        return TABLE.line(*names, *numbers, "" if self.worth else "WORSENS NOTHING")
 
 
 def main() -> int:
     """Print the table as it comes."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("parts", nargs="*", metavar="part", help=f"of {', '.join(PARTS)}; or all")
+    parser = command_line(__doc__)
+    parser.add_argument("parts", nargs="*", type=one_of(PARTS), metavar="part", help="or all")
     args = parser.parse_args()
-    unknown = set(args.parts) - set(PARTS)
-    if unknown:
-        parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(PARTS)}")
-    wp.config.log_level = wp.LOG_WARNING
-    print("  ".join(c.ljust(w) for c, w in zip(COLUMNS, WIDTHS, strict=True)).rstrip())
+    print(TABLE.line(*WIDTHS, ""))
     useless = []
     for key in args.parts or PARTS:
         line = compare(PARTS[key])
-        print(str(line).rstrip(), flush=True)
+        print(line, flush=True)
         if not line.worth:
             useless.append(line.part.name)
     if useless:
@@ -83,24 +76,19 @@ def main() -> int:
 
 def compare(part: Part) -> Line:
     """Run the case of a part with and without it."""
-    kept = figures(part.case)[part.figure]
+    kept = with_every_part(part.case)[part.figure]
     try:
         with part.off():
-            off = part.case()[part.figure]
+            off = part.case.run()[part.figure]
     except SimulationError:
         off = math.inf
     return Line(part, kept, off)
 
 
 @cache
-def figures(case: Callable) -> dict[str, float]:
-    """Those of a case with every part."""
-    return case()
-
-
-def name(case: Callable) -> str:
-    """Of a case in the table."""
-    return case.__doc__.splitlines()[0].rstrip(".")
+def with_every_part(case: Case) -> Found:
+    """The figures of a case; several parts may have the same."""
+    return case.run()
 
 
 if __name__ == "__main__":

@@ -1,110 +1,105 @@
-"""The parts of the default method, each with the case that needs it."""
+"""The parts of the default method, each with the case that needs it.
+
+A part is off by its name in ``warp_contact/data/switches.py``, or by another value of a constant.
+"""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from types import ModuleType
+from typing import NamedTuple
+from unittest import mock
 
-from parts import apart, impacts, loads
-from parts.off import constant, number, switch
+import warp as wp
+
+from parts import cases
+from parts.cases import Case, Quantity
+from warp_contact.data.switches import without
 from warp_contact.frame import step_bounds, stepper
 from warp_contact.kernels.impulse import constraint, tangent
-from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
 from warp_contact.kernels.narrow_phase import edge_contact, edges, vertex_contact
 from warp_contact.step import search
 
 
-@dataclass(frozen=True)
-class Part:
-    """What is switched off, and who misses it.
-
-    Attributes:
-        name: of the part
-        off: a context in which it is off
-        case: a function that returns figures by name
-        figure: of that case
-        least: what the figure is known to, from rounding or from chance
-    """
+class Part(NamedTuple):
+    """What is switched off, and who misses it."""
 
     name: str
-    off: Callable
-    case: Callable[[], dict[str, float]]
-    figure: str
-    least: float
+    off: Callable  # a context in which it is off
+    case: Case
+    figure: Quantity  # of that case
 
 
-FINEST = 100.0 * float(CLOSURE_TOLERANCE)  # % of an edge: an overlap that is left on purpose
-GAIN = 1e-3  # of the energy: what a pile of roundings and closures may add
-ROUNDED = 1e-6  # of the angular momentum: a walk of float32 over a thousand steps
+@contextmanager
+def compiled(owner: ModuleType, name: str, value: float, *users: ModuleType) -> Iterator[None]:
+    """Kernels with another constant of ``owner``: its own, and those of ``users`` of it."""
+    modules = [wp.get_module(module.__name__) for module in (owner, *users)]
+    try:
+        with mock.patch.object(owner, name, wp.constant(value)):
+            for module in modules:
+                module.mark_modified()
+            yield
+    finally:
+        for module in modules:
+            module.mark_modified()
 
 
-def _overlap(name: str, off: Callable, case: Callable) -> Part:
-    return Part(name, off, case, impacts.OVERLAP, FINEST)
+def switch(name: str) -> Callable:
+    """The context without a part that has a name."""
+    return partial(without, name)
 
 
-def _spin(name: str, off: Callable, case: Callable) -> Part:
-    return Part(name, off, case, impacts.SPIN, ROUNDED)
+def kernel(owner: ModuleType, name: str, value: float, *users: ModuleType) -> Callable:
+    """The context of another constant of kernels."""
+    return partial(compiled, owner, name, value, *users)
 
 
-def _gained(name: str, off: Callable, case: Callable) -> Part:
-    return Part(name, off, case, impacts.GAINED, GAIN)
+def number(owner: ModuleType, name: str, value: float) -> Callable:
+    """The context of another constant of the host."""
+    return partial(mock.patch.object, owner, name, value)
 
 
-_inserted = loads.deep, loads.INSERTED, 1e-3
-_without = {
-    "wide": constant(constraint, "WIDE", math.inf),
-    "torque": constant(constraint, "TURN", -1.0),
-    "counted": constant(constraint, "COUNTED", 0.0),
-    "ramp": constant(tangent, "UPRIGHT", 2.0, constraint),
-    "entry": constant(vertex_contact, "ASTRAY", 0.0),
-    "deep end": constant(edge_contact, "ASIDE", 0.0, edges),
-    "bound": number(search, "SEARCH_BOUND", math.inf),
-    "deep": number(step_bounds, "LINGERING", step_bounds.TRAVEL),
-    "thin": number(step_bounds, "REACH", math.inf),
-    "repeats": number(step_bounds, "UNSTABLE", math.inf),
-    "within": number(stepper, "PART", 10**9),
-    "steady": number(step_bounds, "KEEP", 0.0),
+_untwisted = switch("closure torque")
+_planes = switch("old planes")
+_kept = switch("broad phase kept")
+_wide = kernel(constraint, "WIDE", math.inf)
+_torque = kernel(constraint, "TURN", -1.0)
+_counted = kernel(constraint, "COUNTED", 0.0)
+_ramp = kernel(tangent, "UPRIGHT", 2.0, constraint)
+_entry = kernel(vertex_contact, "ASTRAY", 0.0)
+_deep_end = kernel(edge_contact, "ASIDE", 0.0, edges)
+_bound = number(search, "SEARCH_BOUND", math.inf)
+_deep = number(step_bounds, "LINGERING", step_bounds.TRAVEL)
+_thin = number(step_bounds, "REACH", math.inf)
+_repeats = number(step_bounds, "UNSTABLE", math.inf)
+_within = number(stepper, "PART", 10**9)
+_steady = number(step_bounds, "KEEP", 0.0)
+
+_rows = {
+    "edges": ("contacts of edges", switch("edges"), cases.CORNERS, cases.OVERLAP),
+    "layers": ("depth behind the border", switch("layers"), cases.DEEP, cases.INSERTED),
+    "search": ("search for the surface", switch("search"), cases.OVERLAPPING, cases.PLACE),
+    "bound": ("bound of a move in the search", _bound, cases.DEEP, cases.INSERTED),
+    "closure": ("closure", switch("closure"), cases.CORNERS, cases.OVERLAP),
+    "look": ("second look, after the closure", switch("second look"), cases.FINE, cases.OVERLAP),
+    "closure torque": ("torque of the closure", _untwisted, cases.CORNERS, cases.SPIN),
+    "strays": ("vertices that left their triangles", switch("strays"), cases.FINE, cases.OVERLAP),
+    "entry": ("back by the side it came in by", _entry, cases.RIM, cases.OVERLAP),
+    "deep end": ("edges led out by their deep end", _deep_end, cases.ASIDE, cases.OVERLAP),
+    "wide": ("no friction across wide gaps", _wide, cases.ROUGH_RIM, cases.SPIN),
+    "torque": ("torque of friction across a gap", _torque, cases.OBLIQUE, cases.SPIN),
+    "counted": ("weight of that torque in the sweeps", _counted, cases.CORNER, cases.GAINED),
+    "ramp": ("ramps of facets", _ramp, cases.BENT, cases.GAINED),
+    "planes": ("planes that the closure leaves out", _planes, cases.SEAM, cases.GAINED),
+    "warm": ("warm start", switch("warm start"), cases.SHEET, cases.SWEEPS),
+    "hold": ("persistent edges", switch("persistent edges"), cases.BALLS, cases.GAINED),
+    "ahead": ("extrapolation of the sweeps", switch("extrapolation"), cases.DENSE, cases.GAINED),
+    "kept": ("broad phase kept for many steps", _kept, cases.CROWD, cases.TIME),
+    "deep": ("shorter steps while overlaps last", _deep, cases.INSIDE, cases.RISE),
+    "thin": ("shorter steps for thin bodies", _thin, cases.THIN, cases.APPROACH),
+    "repeats": ("frames repeated in shorter steps", _repeats, cases.PULLED, cases.FLATTENED),
+    "within": ("looks within frames with flat tets", _within, cases.CRUSHED, cases.GAINED),
+    "steady": ("steps that hardly grow again", _steady, cases.VIBRATING, cases.DRIFT),
 }
-PARTS = {
-    "edges": _overlap("contacts of edges", switch("edges"), impacts.tilted),
-    "layers": Part("depth behind the border", switch("layers"), *_inserted),
-    "search": Part("search for the surface", switch("search"), loads.overlapping, loads.PLACE, 1.0),
-    "bound": Part("bound of a move in the search", _without["bound"], *_inserted),
-    "closure": _overlap("closure", switch("closure"), impacts.tilted),
-    "look": _overlap("second look, after the closure", switch("second look"), impacts.fine),
-    "closure torque": _spin("torque of the closure", switch("closure torque"), impacts.tilted),
-    "strays": _overlap("vertices that left their triangles", switch("strays"), impacts.fine),
-    "entry": _overlap("back by the side it came in by", _without["entry"], impacts.rim),
-    "deep end": _overlap("edges led out by their deep end", _without["deep end"], impacts.beside),
-    "wide": _spin("no friction across wide gaps", _without["wide"], impacts.rough_rim),
-    "torque": _spin("torque of friction across a gap", _without["torque"], impacts.oblique),
-    "counted": _gained("weight of that torque in the sweeps", _without["counted"], impacts.corner),
-    "ramp": _gained("ramps of facets", _without["ramp"], impacts.bent),
-    "planes": _gained("planes that the closure leaves out", switch("old planes"), impacts.seam),
-    "warm": Part("warm start", switch("warm start"), loads.sheet, loads.SWEEPS, 1.0),
-    "hold": _gained("persistent edges", switch("persistent edges"), impacts.balls),
-    "ahead": Part(
-        "extrapolation of the sweeps", switch("extrapolation"), loads.dense, loads.GAINED, GAIN
-    ),
-    "kept": Part(
-        "broad phase kept for many steps", switch("broad phase kept"), apart.crowd, apart.TIME, 0.0
-    ),
-    "deep": Part(
-        "shorter steps while overlaps last", _without["deep"], loads.inserted, loads.RISE, GAIN
-    ),
-    "thin": Part(
-        "shorter steps for thin bodies", _without["thin"], impacts.thin, impacts.APPROACH, 0.01
-    ),
-    "repeats": Part(
-        "frames repeated in shorter steps",
-        _without["repeats"],
-        apart.pulled,
-        apart.FLATTENED,
-        1.0,
-    ),
-    "within": Part(
-        "looks within frames with flat tets", _without["within"], loads.crushed, loads.GAINED, GAIN
-    ),
-    "steady": Part(
-        "steps that hardly grow again", _without["steady"], apart.vibrating, apart.DRIFT, 1e-3
-    ),
-}
+PARTS = {key: Part(*row) for key, row in _rows.items()}

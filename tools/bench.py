@@ -1,7 +1,7 @@
 """Where time and memory go: one figure a line, as ``case.figure value``.
 
-    python tools/bench.py [case ...] [--quick] [--large] [--frames N] [--fraction PART]
-        [--repeats N] [--device NAME] [--kernels] [--out FILE]
+    python tools/bench.py [case ...] [--large] [--frames N] [--fraction PART]
+        [--repeats N] [--device NAME] [--out FILE]
 
 Each case runs in a process of its own until there are contacts, then the same few steps again and
 again (a window, begun from the same state each time): as one captured graph, and uncaptured with a
@@ -24,7 +24,7 @@ so that other processes on the machine hardly count; those of frames and starts 
                                moving each once would be; a list counts with all its room
     STAGE.share                of the sum of all operations
     STAGE.ns_per_tet, .ns_per_surface_vertex, .ns_per_contact
-    STAGE.OPERATION.launches, .ms   of a kernel or memory operation; printed with --kernels
+    STAGE.OPERATION.launches, .ms   of a kernel or memory operation; only in the file of --out
     frames_per_second          of whole frames of 1/60 s, with the choice of the step
     frame.choice_of_step_share    of the time of these frames
     contacts                   at the end of a step
@@ -48,7 +48,7 @@ from clock.figures import figures, log_slope, start_times
 from clock.scenes import FRACTION, Case, cases
 from measure import report
 from measure.figure import Figure
-from measure.run import command_line, count
+from measure.run import command_line, count, one_of
 
 START = "start"  # the case of the times until the first frame
 OVERHEAD = "squeezed_sphere"
@@ -57,43 +57,37 @@ OVERHEAD = "squeezed_sphere"
 def main() -> int:
     """Run the cases and print their figures as they come."""
     parser = command_line(__doc__)
-    parser.add_argument("cases", nargs="*", metavar="case", help="of those printed; or all")
-    parser.add_argument("--quick", action="store_true", help="small cases, few repeats, no compile")
+    named = one_of([*cases(True, FRACTION), START])
+    parser.add_argument("cases", nargs="*", type=named, metavar="case", help="or all")
     parser.add_argument("--large", action="store_true", help="a pile of 1e6 vertices, 4096 worlds")
     parser.add_argument("--frames", type=count, help="to run before, in place of each case's own")
     parser.add_argument("--fraction", type=float, default=FRACTION, help="of the bowl's fruits")
-    parser.add_argument("--repeats", type=count, help="of a window; 7, or 3 with --quick")
+    parser.add_argument("--repeats", type=count, default=7, help="of a window")
     parser.add_argument("--device", help="cpu, cuda:0, ...")
-    parser.add_argument("--kernels", action="store_true", help="print each operation as well")
     parser.add_argument("--out", metavar="FILE", help="write all figures there as JSON")
     args = parser.parse_args()
-    known = cases(args.quick, args.large, args.fraction)
-    chosen = args.cases or [*known, START]
-    unknown = set(chosen) - set(known) - {START}
-    if unknown:
-        names = ", ".join([*known, START])
-        parser.error(f"no case {', '.join(sorted(unknown))}; there are {names}")
+    known = cases(True, args.fraction)
+    chosen = args.cases or [*cases(args.large, args.fraction), START]
     timed = {name: case for name, case in known.items() if name in chosen}
     found: dict[str, float] = {}
-    repeats = args.repeats or (3 if args.quick else 7)
-    run = partial(figures, frames=args.frames, repeats=repeats, device=args.device)
+    run = partial(figures, frames=args.frames, repeats=args.repeats, device=args.device)
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, spawn, max_tasks_per_child=1) as pool:
         for name, new in zip(timed, pool.map(run, timed.values()), strict=True):
-            found |= show(name, new, args.kernels)
+            found |= show(f"{name}.", new)
     found |= show("", summary(found, timed))
     if START in chosen:
-        found |= show(START, start_times(args.device, cold=not args.quick))
+        found |= show(f"{START}.", start_times(args.device))
     if args.out:
         report.write(args.out, [Figure("", *figure) for figure in found.items()], args.device)
     return 0
 
 
-def show(case: str, new: dict[str, float], kernels: bool = True) -> dict[str, float]:
-    """Print the figures of a case and return them; those of operations only if ``kernels``."""
-    found = {f"{case}.{name}".lstrip("."): value for name, value in new.items()}
+def show(case: str, new: dict[str, float]) -> dict[str, float]:
+    """Print the figures of a case but for those of operations; all of them, by their full names."""
+    found = {case + name: value for name, value in new.items()}
     for name, value in found.items():
-        if kernels or name.count(".") < 3:
+        if name.count(".") < 3:
             print(f"{name} {value:.5g}", flush=True)
     return found
 
@@ -101,7 +95,7 @@ def show(case: str, new: dict[str, float], kernels: bool = True) -> dict[str, fl
 def summary(found: dict[str, float], timed: dict[str, Case]) -> dict[str, float]:
     """The launch overhead, and the exponents of the time of a step over the vertices."""
     new = {}
-    if f"{OVERHEAD}.step.ms" in found:
+    if OVERHEAD in timed:
         new["launch_overhead_us"] = found[f"{OVERHEAD}.step.overhead_us_per_launch"]
     for series in sorted({case.series for case in timed.values()} - {""}):
         names = [name for name, case in timed.items() if case.series == series]

@@ -1,6 +1,6 @@
 """What contact costs when little of it happens: the same 64 spheres in ever more contact.
 
-    python tools/economy.py [--quick] [--repeats N] [--device NAME] [--out FILE]
+    python tools/economy.py [--repeats N] [--device NAME]
 
 The spheres are far apart; or so many pairs of them touch, the others far apart; or each rests on a
 floor by itself; or all have collapsed into a pile on it. The floor is a plane or a mesh. Columns:
@@ -26,11 +26,10 @@ sleep let them come from where they else are.
 import sys
 
 import numpy as np
-from clock.figures import frame_times, log_slope, step_figures
-from clock.scenes import blocks, rows
+from clock.figures import frame_times, log_slope
+from clock.scenes import ROWS, blocks
 from clock.window import Timing, measure
-from measure import report
-from measure.figure import Figure
+from measure.report import Table
 from measure.run import command_line, count
 
 from warp_contact import Simulation
@@ -39,54 +38,39 @@ FRICTIONS = 0.3, 0.0
 SUBSTEPS = 20
 SETTLING, REST, LONG, SAMPLE = 20, 40, 900, 20  # frames of the blocks
 COLUMNS = {"case": 15, "friction": 8, "vertices": 8, "contacts": 8, "launches": 8}
-TABLE = report.Table(**COLUMNS, step=6, elastic=7, KiB=5, stages=0)
+TABLE = Table(**COLUMNS, step=6, elastic=7, KiB=5, stages=0)
 
 
 def main() -> int:
     """Measure line by line, then print what follows from them."""
     parser = command_line(__doc__)
-    parser.add_argument("--quick", action="store_true", help="one friction, floors not settled")
-    parser.add_argument("--repeats", type=count, help="of a window; 5, or 3 with --quick")
+    parser.add_argument("--repeats", type=count, default=5, help="of a window")
     parser.add_argument("--device", help="cpu, cuda:0, ...")
-    parser.add_argument("--out", metavar="FILE", help="write all figures there as JSON")
     args = parser.parse_args()
     print(TABLE.head())
-    found: dict[str, float] = {}
     after: dict[str, float] = {}
-    for friction in FRICTIONS[: 1 if args.quick else None]:
-        table = rows(args.quick)
+    for friction in FRICTIONS:
         timings = {}
-        for name, case in table.items():
+        for name, case in ROWS.items():
             sim = Simulation(case.build(friction), substeps=SUBSTEPS, device=args.device)
-            for _ in sim.frames(case.frames):
-                pass
-            timings[name] = measure(sim, args.repeats or (3 if args.quick else 5))
-            print(line(name, friction, sim.model.n_vert, timings[name]), flush=True)
-            new = step_figures(timings[name], sim.model)
-            found |= {f"{name}.{friction:g}.{key}": value for key, value in new.items()}
-        pairs = {name: case.pairs for name, case in table.items() if case.pairs}
-        new = summary(timings, pairs)
-        after |= {f"friction {friction:g}: {name}": value for name, value in new.items()}
+            frame_times(sim, case.frames)
+            timings[name] = t = measure(sim, args.repeats)
+            cells = f"{friction:g}", str(sim.model.n_vert), f"{t.contacts:.1f}"
+            times = f"{t.whole.launches:.1f}", f"{t.step_ms:.3f}", f"{t.elastic_ms:.3f}"
+            stages = ", ".join(f"{stage} {cost.ms:.3f}" for stage, cost in t.stages.items())
+            row = TABLE.line(name, *cells, *times, f"{t.bytes / 1024:.0f}", stages)
+            print(row, flush=True)
+        for name, value in summary(timings).items():
+            after[f"friction {friction:g}: {name}"] = value
     after |= {f"blocks: {name}": value for name, value in sleep_figures(args.device).items()}
     print("", *(f"{name} {value:.3g}" for name, value in after.items()), sep="\n")
-    if args.out:
-        figures = [Figure("", *figure) for figure in (found | after).items()]
-        report.write(args.out, figures, args.device)
     return 0
 
 
-def line(name: str, friction: float, vertices: int, timing: Timing) -> str:
-    """One line of the table."""
-    stages = ", ".join(f"{stage} {cost.ms:.3f}" for stage, cost in timing.stages.items())
-    cells = f"{friction:g}", f"{vertices}", f"{timing.contacts:.1f}", f"{timing.whole.launches:.1f}"
-    times = f"{timing.step_ms:.3f}", f"{timing.elastic_ms:.3f}"
-    return TABLE.line(name, *cells, *times, f"{timing.bytes / 1024:.0f}", stages)
-
-
-def summary(timings: dict[str, Timing], pairs: dict[str, int]) -> dict[str, float]:
+def summary(timings: dict[str, Timing]) -> dict[str, float]:
     """What the lines of one friction say together."""
     added = {name: timing.step_ms - timing.elastic_ms for name, timing in timings.items()}
-    beyond = {n: added[name] - added["apart"] for name, n in pairs.items()}
+    beyond = {case.pairs: added[name] - added["apart"] for name, case in ROWS.items() if case.pairs}
     dearer = {n: ms for n, ms in beyond.items() if ms > 0.0}
     each, fixed = np.polyfit(list(beyond), list(beyond.values()), 1)
     apart = timings["apart"]

@@ -34,11 +34,18 @@ def figures(case: Case, frames: int | None, repeats: int, device: str | None) ->
     """Run a case until there are contacts, then time it."""
     wp.config.log_level = wp.LOG_WARNING
     sim = wc.Simulation(case.build(), device=device)
-    for _ in sim.frames(case.frames if frames is None else frames):
-        pass
-    timing = measure(sim, repeats)
-    model = sim.model
-    seconds, choice = frame_time(sim)
+    frame_times(sim, case.frames if frames is None else frames)
+    timing, model, spectrum = measure(sim, repeats), sim.model, sim._stepper.spectrum
+    choice, rates = [], spectrum.rates
+
+    def timed(x: wp.array) -> tuple[float, float]:
+        start = perf_counter()
+        found = rates(x)
+        choice.append(perf_counter() - start)
+        return found
+
+    with mock.patch.object(spectrum, "rates", timed):
+        times = frame_times(sim, SHOWN_FRAMES)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return {
         "vertices": model.n_vert,
@@ -48,8 +55,8 @@ def figures(case: Case, frames: int | None, repeats: int, device: str | None) ->
         "substeps": sim.substeps,
         "window_steps": timing.steps,
         **step_figures(timing, model),
-        "frames_per_second": 1.0 / seconds,
-        "frame.choice_of_step_share": choice,
+        "frames_per_second": 1.0 / median(times),
+        "frame.choice_of_step_share": sum(choice) / sum(times),
         "array_bytes_per_vertex": timing.bytes / model.n_vert,
         "peak_rss_bytes": peak if sys.platform == "darwin" else 1024 * peak,
     }
@@ -60,6 +67,7 @@ def step_figures(timing: Timing, model) -> dict[str, float]:
     whole, step = timing.whole, timing.step_ms
     sizes = {"tet": model.n_tet, "surface_vertex": model.n_surf, "contact": timing.contacts}
     bound = sum(ns * n for ns, n in zip(BOUND, sizes.values(), strict=True))
+    overhead = 1e3 * (step - whole.ms)
     found = {
         "contacts": timing.contacts,
         "array_bytes": timing.bytes,
@@ -68,40 +76,24 @@ def step_figures(timing: Timing, model) -> dict[str, float]:
         "step.ns_per_vertex": 1e6 * step / model.n_vert,
         "step.elastic_ms": timing.elastic_ms,
         "step.operations_ms": whole.ms,
-        "step.overhead_us_per_launch": timing.overhead_us,
-        "step.overhead_us": timing.overhead_us * whole.launches,
+        "step.overhead_us_per_launch": overhead / whole.launches,
+        "step.overhead_us": overhead,
         "step.of_bound": 1e6 * step / bound,
         "step.bytes": whole.bytes,
     }
     for stage, cost in timing.stages.items():
         found |= {f"{stage}.{name}": value for name, value in cost._asdict().items()}
         found[f"{stage}.share"] = cost.ms / (whole.ms or 1.0)  # a clock may be too coarse
-        for thing, n in sizes.items():
-            if n:
-                found[f"{stage}.ns_per_{thing}"] = 1e6 * cost.ms / n
+        each = {f"{stage}.ns_per_{thing}": 1e6 * cost.ms / n for thing, n in sizes.items() if n}
+        found |= each
     for (stage, name), cost in timing.kernels.items():
         found[f"{stage}.{name}.launches"] = cost.launches
         found[f"{stage}.{name}.ms"] = cost.ms
     return found
 
 
-def frame_time(sim: wc.Simulation) -> tuple[float, float]:
-    """Time of a frame [s], that on the host included, and the part that chooses the step."""
-    times, choice, rates = [], [0.0], sim._stepper.spectrum.rates
-
-    def timed(x: wp.array) -> tuple[float, float]:
-        start = perf_counter()
-        found = rates(x)
-        choice[0] += perf_counter() - start
-        return found
-
-    with mock.patch.object(sim._stepper.spectrum, "rates", timed):
-        times = frame_times(sim, SHOWN_FRAMES)
-    return median(times), choice[0] / sum(times)
-
-
 def frame_times(sim: wc.Simulation, frames: int) -> list[float]:
-    """Wall time of each of the next frames [s]."""
+    """Wall time of each of the next frames [s], that on the host included."""
     times = []
     for _ in range(frames):
         start = perf_counter()
@@ -111,28 +103,21 @@ def frame_times(sim: wc.Simulation, frames: int) -> list[float]:
     return times
 
 
-def start_times(device: str | None, cold: bool) -> dict[str, float]:
+def start_times(device: str | None) -> dict[str, float]:
     """Seconds of the import, and from there to the end of the first frame.
 
     ``cold_frame_s`` compiles all kernels, ``warm_frame_s`` finds them compiled.
     """
-    found = {}
-    with tempfile.TemporaryDirectory() as cache:
-        environment = os.environ | ({"WARP_CACHE_PATH": cache} if cold else {})
-        if cold:
-            found["cold_frame_s"] = _start(device, environment)[1]
-        runs = [_start(device, environment) for _ in range(STARTS)]
-    imports, frames = zip(*runs, strict=True)
-    return {"import_s": median(imports), "warm_frame_s": median(frames), **found}
-
-
-def _start(device: str | None, environment: dict[str, str]) -> list[float]:
-    """One start, in a process of its own."""
     command = [sys.executable, "-c", START.format(device)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"the start failed: {done.stderr.strip()}")
-    return [float(seconds) for seconds in done.stdout.splitlines()[-1].split()]
+    with tempfile.TemporaryDirectory() as cache:
+        run = {"env": os.environ | {"WARP_CACHE_PATH": cache}, "stdout": subprocess.PIPE}
+        starts = []
+        for _ in range(1 + STARTS):
+            done = subprocess.run(command, text=True, check=True, **run)
+            starts.append([float(seconds) for seconds in done.stdout.splitlines()[-1].split()])
+    imports, frames = zip(*starts[1:], strict=True)
+    first = {"import_s": median(imports), "warm_frame_s": median(frames)}
+    return first | {"cold_frame_s": starts[0][1]}
 
 
 def log_slope(x, y) -> float:

@@ -37,31 +37,26 @@ class Operation(NamedTuple):
     ms: float
 
 
-class StageTimer:
+class StageTimer(ExitStack):
     """Keeps a record of every operation while it is entered, in order, as ``operations``."""
 
     def __init__(self, device: wp.Device):
         """``device`` is that of the step."""
+        super().__init__()
         self.operations: list[Operation] = []
-        self._device = device
-        self._inside = False
-        self._patches = ExitStack()
+        self._device, self._inside = device, False
         one, other = (wp.zeros(1, dtype=int, device=device) for _ in range(2))
         tree = wp.Bvh(*(wp.zeros(1, dtype=wp.vec3, device=device) for _ in range(2)))
         self._few = one, other, tree
 
     def __enter__(self):
         """Put the timer between the step and Warp."""
-        patches = {(wp, "launch"): self._launch(wp.launch)}
+        timed = {(wp, "launch"): self._launch(wp.launch)}
         for (owner, name), small in MEMORY.items():
-            patches[owner, name] = self._operation(name, getattr(owner, name), small)
-        for place, function in patches.items():
-            self._patches.enter_context(mock.patch.object(*place, function))
+            timed[owner, name] = self._operation(name, getattr(owner, name), small)
+        for place, function in timed.items():
+            self.enter_context(mock.patch.object(*place, function))
         return self
-
-    def __exit__(self, *error):
-        """Take the timer out again."""
-        self._patches.close()
 
     def _launch(self, launch):
         def call(kernel, *args, **kwargs):
@@ -71,10 +66,10 @@ class StageTimer:
             bounds = command.params[0]
             command.set_dim(0)
             command.launch()
-            empty = self._ms(command.launch)
+            empty = milliseconds(self._device, command.launch)
             command.params[0] = bounds
             given = *kwargs.get("inputs", ()), *kwargs.get("outputs", ())
-            self._note(kernel.key, given, self._ms(command.launch) - empty)
+            self._note(kernel.key, given, milliseconds(self._device, command.launch) - empty)
 
         return call
 
@@ -83,25 +78,26 @@ class StageTimer:
             if self._inside:  # one operation may be made of others
                 return function(*args, **kwargs)
             self._inside = True
-            try:
-                small(*self._few)
-                empty = self._ms(lambda: small(*self._few))
-                self._note(name, args, self._ms(lambda: function(*args, **kwargs)) - empty)
-            finally:
-                self._inside = False
+            small(*self._few)
+            empty = milliseconds(self._device, small, *self._few)
+            ms = milliseconds(self._device, function, *args, **kwargs)
+            self._inside = False
+            self._note(name, args, ms - empty)
 
         return call
 
-    def _ms(self, function) -> float:
-        clock = thread_time if self._device.is_cpu else perf_counter
-        start = clock()
-        function()
-        if not self._device.is_cpu:
-            wp.synchronize_device(self._device)
-        return 1e3 * (clock() - start)
-
     def _note(self, name: str, given: tuple, ms: float) -> None:
         self.operations.append(Operation(_stage(), name, held(given), ms))
+
+
+def milliseconds(device: wp.Device, function, *args, **kwargs) -> float:
+    """Time of a call and of what it asks of the device [ms]."""
+    clock = thread_time if device.is_cpu else perf_counter
+    start = clock()
+    function(*args, **kwargs)
+    if not device.is_cpu:
+        wp.synchronize_device(device)
+    return 1e3 * (clock() - start)
 
 
 def _stage() -> str:
@@ -109,6 +105,7 @@ def _stage() -> str:
     while frame:
         module = frame.f_globals.get("__name__", "")
         if module.startswith(ROOM):
-            return {"step": ALONE}.get(stage := module.removeprefix(ROOM), stage)
+            stage = module.removeprefix(ROOM)
+            return ALONE if stage == "step" else stage
         frame = frame.f_back
     return OTHER

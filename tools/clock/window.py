@@ -1,16 +1,13 @@
 """The same few steps of a simulation again and again, captured and operation by operation."""
 
 from collections import defaultdict
-from dataclasses import dataclass
-from itertools import pairwise
 from statistics import mean, median
-from time import perf_counter, thread_time
 from typing import NamedTuple
 
 import warp as wp
 
 from clock.memory import Snapshot, held
-from clock.timer import StageTimer
+from clock.timer import Operation, StageTimer, milliseconds
 from warp_contact import Simulation
 from warp_contact.step.forces import share_for, stages_for
 from warp_contact.step.loop import step_of
@@ -33,8 +30,7 @@ class Cost(NamedTuple):
         return Cost(*(a + b for a, b in zip(self, other, strict=True)))
 
 
-@dataclass(frozen=True)
-class Timing:
+class Timing(NamedTuple):
     """One step on average over a window; each time in it is the median of its repeats."""
 
     steps: int  # in the window
@@ -57,11 +53,6 @@ class Timing:
         """Cost of all operations."""
         return sum(self.stages.values(), Cost())
 
-    @property
-    def overhead_us(self) -> float:
-        """Time of the captured step beyond the sum of its operations, for each of them."""
-        return 1e3 * (self.step_ms - self.whole.ms) / self.whole.launches
-
 
 def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
     """Time a window of steps that begins at the last finished frame; needs one.
@@ -81,18 +72,11 @@ def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
     for same in zip(*operations, strict=True):  # repeats do the same in the same order
         ms = median(o.ms for o in same)
         kernels[same[0][:2]] += Cost(1.0 / steps, ms / steps, same[0].bytes / steps)
-    return Timing(
-        steps=steps,
-        step_ms=_mean_of_medians(whole, steps),
-        elastic_ms=_mean_of_medians(without, steps),
-        contacts=mean(window.contacts),
-        bytes=held(sim.model, sim.state, sim._stepper.work),
-        kernels=dict(kernels),
+    step_ms, elastic_ms = (
+        sum(median(times) for times in zip(*of, strict=True)) / steps for of in (whole, without)
     )
-
-
-def _mean_of_medians(runs: tuple[list[float], ...], steps: int) -> float:
-    return sum(median(times) for times in zip(*runs, strict=True)) / steps
+    everything = held(sim.model, sim.state, sim._stepper.work)
+    return Timing(steps, step_ms, elastic_ms, mean(window.contacts), everything, dict(kernels))
 
 
 def _elastic(model, state, work, stages: int) -> None:
@@ -117,14 +101,13 @@ def _fitting(sim: Simulation, steps: int) -> "_Window":
 
 class _Window:
     def __init__(self, sim: Simulation, steps: int):
-        self._steps = steps
         stepper = sim._stepper
-        self._work, self._device = stepper.work, sim.device
+        self._steps, self._work, self._device = steps, stepper.work, sim.device
         self._work.share.fill_(share_for(stepper.rates[1], stepper.dt))
+        self._work.overflow.all.zero_()
         self.step = step_of(sim.response, bool(stepper.overlapping))
         stages = stages_for(stepper.rates[1], stepper.dt)
         self._arguments = sim.model, sim.state, self._work, stages
-        self._work.overflow.all.zero_()
         self._start = Snapshot(sim.state, self._work)
         self.contacts: list[int] = []
 
@@ -141,18 +124,11 @@ class _Window:
     def replay(self, graph: wp.Graph) -> list[float]:
         """Time of each step [ms]."""
         self.restore()
-        cpu = self._device.is_cpu
-        clock = thread_time if cpu else perf_counter
         wp.synchronize_device(self._device)
-        marks = [clock()]
-        for _ in range(self._steps):
-            wp.capture_launch(graph)
-            if not cpu:
-                wp.synchronize_device(self._device)
-            marks.append(clock())
-        return [1e3 * (end - start) for start, end in pairwise(marks)]
+        launch = wp.capture_launch
+        return [milliseconds(self._device, launch, graph) for _ in range(self._steps)]
 
-    def operations(self) -> list:
+    def operations(self) -> list[Operation]:
         """Every operation of the window, in order."""
         self.restore()
         self.contacts.clear()

@@ -16,8 +16,8 @@ from warp_contact.step import search
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
 import ablation
-from parts.cases import Case, Quantity
-from parts.table import PARTS, Part, number
+from ablation import PARTS, Part, number
+from trials.parts import Case, Quantity
 
 OWNERS = constraint, edge_contact, search, step_bounds, stepper, tangent, vertex_contact
 

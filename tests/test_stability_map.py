@@ -48,7 +48,7 @@ def test_a_block_carries_16_of_its_moduli_and_not_40_with_a_contact_and_without(
 
 def test_the_line_of_a_limit_ends_at_the_rim_of_the_map():
     s = sweeps.SWEEPS["ratio"]
-    i, j = sweeps.limit_line(s, *s.axes(False))
+    i, j = sweeps.limit_line(s)
     # Mass ratios 10^0, 10^0.4, ... against stiffness ratios 10^-4, 10^-3.2, ...: from 10^1.2 on.
     np.testing.assert_array_equal(i, np.arange(3, 11))
     np.testing.assert_allclose(j, (0.4 * i - np.log10(25.0)) / 0.8)
@@ -57,8 +57,8 @@ def test_the_line_of_a_limit_ends_at_the_rim_of_the_map():
 def test_the_map_writes_a_row_per_cell_and_a_picture(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(maps, "METHODS", METHODS[:2])
-    monkeypatch.setattr(sweeps, "COARSE", 2)
-    assert maps.draw(["speed"], True, tmp_path) == 0
+    monkeypatch.setattr(sweeps, "CELLS", 2)
+    assert maps.draw(["speed"], tmp_path) == 0
     rows = (tmp_path / "map.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * 4
     assert (tmp_path / "speed.png").stat().st_size > 1000
@@ -67,13 +67,14 @@ def test_the_map_writes_a_row_per_cell_and_a_picture(tmp_path, monkeypatch):
 def test_without_matplotlib_the_map_says_so(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.delitem(sys.modules, "trials.picture", raising=False)
-    assert maps.draw(["speed"], True, tmp_path / "map") == 1
+    assert maps.draw(["speed"], tmp_path / "map") == 1
     assert capsys.readouterr().err.count("\n") == 1
 
 
 @pytest.mark.slow
-def test_every_mass_and_stiffness_ratio_of_the_quick_map_is_fine():
+def test_every_mass_and_stiffness_ratio_of_a_coarse_map_is_fine(monkeypatch):
+    monkeypatch.setattr(sweeps, "CELLS", 5)
     s = sweeps.SWEEPS["ratio"]
-    xs, ys = s.axes(quick=True)
+    xs, ys = s.axes()
     found = {(x, y): attempt(partial(s.build, x, y), most_steps=600) for x in xs for y in ys}
     assert {cell: r for cell, r in found.items() if classify(r) != outcome.FINE} == {}

@@ -1,12 +1,12 @@
 """One hash for each of some short runs that together reach every kernel of a simulation.
 
-    python tools/fingerprint.py [run ...] [--out FILE] [--against FILE] [--reach] [--contracted]
+    python tools/fingerprint.py [run ...] [--against FILE] [--reach] [--contracted]
 
 A hash is of positions, velocities, contact forces and contact fields after every frame, to the last
 bit: a change that is meant to change nothing leaves all of them as they were, and one that is meant
 to change something says which. Bits depend on the processor and on the version of Warp, so compare
-on one machine only: ``--out`` writes the hashes, ``--against`` compares with those of a file, and
-the exit status is 1 when any differs. ``--reach`` prints which kernels no run has launched.
+on one machine only: ``--against`` compares with a file of what was printed before, and the exit
+status is 1 when any differs. ``--reach`` prints which kernels no run has launched.
 
 Kernels are compiled so that each product and each sum is rounded by itself. As simulations run them
 (``--contracted``) the compiler contracts products and sums as it sees fit, which depends on how the
@@ -40,54 +40,23 @@ def frames(sim: wc.Simulation, n: int) -> Run:
         yield sim
 
 
-def paper(name: str, n: int, **arguments) -> Run:
+def paper(n: int, name: str, **arguments) -> Run:
     """A scene of the paper."""
     return frames(wc.Simulation(load(name).build(**arguments)), n)
 
 
-def two_blocks(friction: float = 0.3) -> wc.Scene:
-    """A block falls on another, a little aside, on a floor."""
-    low = body(wc.box(0.1, 3), JELLY, 0.052)
-    high = body(wc.box(0.08, 2), JELLY, (0.01, 0.02, 0.144), v=(0.1, 0.0, -0.5))
-    return scene(low, high, planes=[UP], friction=friction)
+def run(n: int, *bodies: dict, response=None, fps=60, substeps=None, **around) -> Run:
+    """Bodies among what is ``around``: gravity, friction and planes."""
+    return frames(wc.Simulation(scene(*bodies, **around), response, fps, substeps), n)
 
 
-def responding(response) -> Run:
-    """The same two blocks with another response."""
-    return frames(wc.Simulation(two_blocks(), response, fps=120), 15)
-
-
-def inside(search: str) -> Run:
-    """Blocks that start inside each other."""
-    high = body(wc.box(0.1, 4), FIRM, (0.02, 0.01, 0.06))
-    start = scene(body(wc.box(0.1, 3), JELLY), high, gravity=NONE)
-    return frames(wc.Simulation(start, wc.ContactSurface(search)), 6)
-
-
-def tilted() -> Run:
-    """Corners and edges strike and slide."""
-    turn = np.array([0.3, 0.4, 0.5, 0.7]) / np.sqrt(0.99)
-    high = body(wc.box(0.1, 5), FIRM, (0.02, 0.013, 0.13), turn, (0.1, 0.0, -0.5))
-    start = scene(body(wc.box(0.1, 4), JELLY, v=0.5), high, gravity=NONE, friction=0.4)
-    return frames(wc.Simulation(start, fps=240), 25)
-
-
-def crossed() -> Run:
-    """Bars that lie across each other touch along their edges alone."""
-    bar, s, c = wc.box((0.4, 0.04, 0.04), (8, 1, 1)), np.sin(np.pi / 8), np.cos(np.pi / 8)
-    low = body(bar, FIRM, turn=(s, 0.0, 0.0, c), fixed=np.abs(bar.vertices[:, 0]) > 0.19)
-    across = np.sqrt(0.5) * np.array([s, s, c, c])
-    high = body(bar, JELLY, (0.03, 0.0, 0.058), across)
-    return frames(wc.Simulation(scene(low, high)), 20)
-
-
-def friction() -> Run:
+def slide() -> Run:
     """A block slides down a slope, made of a plane, into a wall."""
     slope, turn = np.array([np.sin(0.5), 0.0, np.cos(0.5)]), (0.0, np.sin(0.25), 0.0, np.cos(0.25))
     block = body(wc.box(0.1, 2), JELLY, 0.0502 * slope, turn, (0.5, 0.1, 0.0))
-    slide = scene(block, planes=[slope])
-    slide.add_plane((-1.0, 0.0, 0.0), -0.15)
-    return frames(wc.Simulation(slide), 30)
+    valley = scene(block, planes=[slope])
+    valley.add_plane((-1.0, 0.0, 0.0), -0.15)
+    return frames(wc.Simulation(valley), 30)
 
 
 def materials() -> Run:
@@ -102,7 +71,7 @@ def materials() -> Run:
     for k, kind in enumerate(kinds):
         place = 0.01 * (-1) ** k, 0.0, 0.041 + 0.082 * k
         stack.append(body(wc.box(0.08, 2 + k % 2), kind, place))
-    return frames(wc.Simulation(scene(*stack, planes=[UP], friction=0.5)), 12)
+    return run(12, *stack, planes=[UP], friction=0.5)
 
 
 def worlds() -> Run:
@@ -112,7 +81,7 @@ def worlds() -> Run:
         bodies.append(body(wc.sphere(0.05, 95), JELLY, 0.051, world=world))
         place, v = (0.01, 0.0, 0.14), -0.5 - 0.2 * world
         bodies.append(body(wc.box(0.06, 2), FIRM, place, v=v, world=world))
-    return frames(wc.Simulation(scene(*bodies, planes=[UP])), 12)
+    return run(12, *bodies, planes=[UP])
 
 
 def sleeping() -> Run:
@@ -142,24 +111,12 @@ def driven() -> Run:
 
 def resumed() -> Run:
     """A run that goes on from its checkpoint in another simulation."""
-    first, second = (wc.Simulation(two_blocks()) for _ in range(2))
+    first, second = (wc.Simulation(scene(*BLOCKS, planes=[UP])) for _ in range(2))
     yield from frames(first, 8)
     with tempfile.TemporaryDirectory() as folder:
         first.save(Path(folder) / "half.npz")
         second.load(Path(folder) / "half.npz")
     yield from frames(second, 8)
-
-
-def crushed() -> Run:
-    """Tets are pressed flat, and frames repeated."""
-    heavy = wc.NeoHookean(5e5, 0.3, 40000.0, 1e-3)
-    low, high = body(wc.box(0.05, 2), JELLY, 0.026), body(wc.box(0.1, 2), heavy, 0.105, v=-2.0)
-    return frames(wc.Simulation(scene(low, high, planes=[UP])), 12)
-
-
-def chosen() -> Run:
-    """Steps that the user chose."""
-    return frames(wc.Simulation(two_blocks(friction=0.4), substeps=40), 10)
 
 
 def pile() -> Run:
@@ -168,33 +125,56 @@ def pile() -> Run:
     for k in range(48):
         place = 0.062 * np.array([k % 4, k // 4 % 4, k // 16]) + rng.uniform(0.0, 0.003, 3)
         balls.append(body(wc.sphere(0.03, 41), JELLY, place + [0.0, 0.0, 0.031]))
-    return frames(wc.Simulation(scene(*balls, planes=[UP])), 14)
+    return run(14, *balls, planes=[UP])
 
 
+BLOCKS = (  # one falls on the other, a little aside
+    body(wc.box(0.1, 3), JELLY, 0.052),
+    body(wc.box(0.08, 2), JELLY, (0.01, 0.02, 0.144), v=(0.1, 0.0, -0.5)),
+)
+INSIDE = body(wc.box(0.1, 3), JELLY), body(wc.box(0.1, 4), FIRM, (0.02, 0.01, 0.06))
+TILT = np.array([0.3, 0.4, 0.5, 0.7]) / np.sqrt(0.99)
+CORNERS = (  # and edges strike and slide
+    body(wc.box(0.1, 4), JELLY, v=0.5),
+    body(wc.box(0.1, 5), FIRM, (0.02, 0.013, 0.13), TILT, (0.1, 0.0, -0.5)),
+)
+S, C = np.sin(np.pi / 8), np.cos(np.pi / 8)
+BAR = wc.box((0.4, 0.04, 0.04), (8, 1, 1))
+CROSSED = (  # bars that lie on an edge each touch along their edges alone
+    body(BAR, FIRM, turn=(S, 0.0, 0.0, C), fixed=np.abs(BAR.vertices[:, 0]) > 0.19),
+    body(BAR, JELLY, (0.03, 0.0, 0.058), np.sqrt(0.5) * np.array([S, S, C, C])),
+)
+HEAVY = wc.NeoHookean(5e5, 0.3, 40000.0, 1e-3)
+CRUSHED = (  # tets are pressed flat, and frames repeated
+    body(wc.box(0.05, 2), JELLY, 0.026),
+    body(wc.box(0.1, 2), HEAVY, 0.105, v=-2.0),
+)
+
+falling = partial(run, 15, *BLOCKS, planes=[UP], fps=120)
 RUNS: dict[str, Callable[[], Run]] = {
-    "two_bodies": partial(paper, "two_bodies", 6),
-    "sampling": partial(paper, "sampling", 5),
-    "squeezed_sphere": partial(paper, "squeezed_sphere", 40),
-    "cubes_on_membrane": partial(paper, "cubes_on_membrane", 20),
-    "membrane_stack": partial(paper, "membrane_stack", 6),
-    "bowl": partial(paper, "bowl", 20, fraction=0.1),
-    "inside": partial(inside, "balanced"),
-    "inside_literal": partial(inside, "literal"),
-    "tilted": tilted,
-    "crossed": crossed,
-    "friction": friction,
+    "two_bodies": partial(paper, 6, "two_bodies"),
+    "sampling": partial(paper, 5, "sampling"),
+    "squeezed_sphere": partial(paper, 40, "squeezed_sphere"),
+    "cubes_on_membrane": partial(paper, 20, "cubes_on_membrane"),
+    "membrane_stack": partial(paper, 6, "membrane_stack"),
+    "bowl": partial(paper, 20, "bowl", fraction=0.1),
+    "inside": partial(run, 6, *INSIDE, gravity=NONE),
+    "inside_literal": partial(run, 6, *INSIDE, response=wc.ContactSurface("literal"), gravity=NONE),
+    "tilted": partial(run, 25, *CORNERS, gravity=NONE, friction=0.4, fps=240),
+    "crossed": partial(run, 20, *CROSSED),
+    "friction": slide,
     "materials": materials,
-    "literal": partial(responding, wc.ContactSurface("literal")),
-    "penalty": partial(responding, wc.Penalty(2000.0, 0.5)),
-    "predicted": partial(responding, wc.PredictedForce()),
+    "literal": partial(falling, response=wc.ContactSurface("literal")),
+    "penalty": partial(falling, response=wc.Penalty(2000.0, 0.5)),
+    "predicted": partial(falling, response=wc.PredictedForce()),
     "worlds": worlds,
     "sleeping": sleeping,
     "driven": driven,
     "resumed": resumed,
-    "crushed": crushed,
-    "chosen": chosen,
+    "crushed": partial(run, 12, *CRUSHED, planes=[UP]),
+    "chosen": partial(run, 10, *BLOCKS, planes=[UP], friction=0.4, substeps=40),
     "pile": pile,
-    "sheets": partial(paper, "membrane_stack", 10, count=3, gap=0.002),  # vertex on vertex
+    "sheets": partial(paper, 10, "membrane_stack", count=3, gap=0.002),  # vertex on vertex
 }
 
 
@@ -228,7 +208,6 @@ def main() -> int:
     """Print the hashes; compare them where asked to."""
     parser = command_line(__doc__)
     parser.add_argument("runs", nargs="*", type=one_of(RUNS), metavar="run", help="or all")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the hashes there too")
     parser.add_argument("--against", type=Path, metavar="FILE", help="compare with those of a file")
     parser.add_argument("--reach", action="store_true", help="name kernels that no run launched")
     parser.add_argument("--contracted", action="store_true", help="compile as simulations do")
@@ -237,27 +216,25 @@ def main() -> int:
         round_each_operation()
     lines = args.against.read_text(encoding="utf-8").splitlines() if args.against else []
     before = dict(line.split() for line in lines)
-    found, launched, launch = {}, set(), wp.launch
+    changed, launched, launch = 0, set(), wp.launch
 
     def noted(kernel: wp.Kernel, *given, **named):
         launched.add(kernel)
         return launch(kernel, *given, **named)
 
+    chosen = args.runs or list(RUNS)
     with mock.patch.object(wp, "launch", noted):
-        for name in args.runs or RUNS:
-            found[name] = value = fingerprint(RUNS[name]())
-            was = "" if before.get(name, value) == value else f"  was {before[name]}"
-            print(f"{name:20}{value}{was}", flush=True)
-    changed = [name for name, value in found.items() if before.get(name, value) != value]
-    if args.out:
-        text = "".join(f"{name} {value}\n" for name, value in found.items())
-        args.out.write_text(text, encoding="utf-8")
+        for name in chosen:
+            value = fingerprint(RUNS[name]())
+            was = before.get(name, value)
+            changed += was != value
+            print(f"{name} {value}" + (f" was {was}" if was != value else ""), flush=True)
     if args.reach:
         missed = sorted(f"{k.module.name}.{k.key}" for k in kernels() - launched)
         print("not launched:", ", ".join(missed) or "none")
     if args.against:
-        print(f"{len(changed)} of {len(found)} changed")
-    return int(bool(changed))
+        print(f"{changed} of {len(chosen)} changed")
+    return int(changed > 0)
 
 
 if __name__ == "__main__":

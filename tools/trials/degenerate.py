@@ -12,7 +12,7 @@ from trials.setting import DOWN, NONE, UP, Case, Setting, body, case, setting, s
 EDGE = 0.1  # [m]
 
 
-def cases(quick: bool) -> Iterator[Case]:
+def cases() -> Iterator[Case]:
     """What has to run, then what has to be refused."""
     for name, aside in (("aligned", 0.0), ("shifted by half a cell", 0.25 * EDGE)):
         for gap in (0.0, -1e-12, -1e-6, 1e-6):
@@ -25,12 +25,12 @@ def cases(quick: bool) -> Iterator[Case]:
     yield case("B11 sliver tet of aspect 1000", sliver, 1e3)
     yield case("B11 sliver tet of aspect 1e+06", sliver, 1e6, expect=BEYOND)
     yield case("B11 inverted tets at the start", pulled_through)
-    for far in (1e1, 1e2, 1e3) if quick else (1e1, 1e2, 1e3, 1e5, 1e7):
+    for far in (1e1, 1e2, 1e3, 1e5, 1e7):
         expect = FINE if far < 2e3 else BEYOND
         yield case(f"B11 {far:g} m from the origin", pair, far=far, expect=expect)
     for scale in (1e-3, 1.0, 1e3):
         yield case(f"B11 lengths times {scale:g}", pair, scale=scale)
-    for young in (1e2, 1e6, 1e9) if quick else (1e2, 1e6, 1e9, 1e12):
+    for young in (1e2, 1e6, 1e9, 1e12):
         yield case(f"B11 E {young:g}", pair, young=young, v=5e-4 * young**0.5, gravity=NONE)
     for density in (1e-2, 1e5):
         yield case(f"B11 density {density:g}", pair, density=density, young=100 * density)
@@ -46,30 +46,34 @@ def cases(quick: bool) -> Iterator[Case]:
 def refusals() -> Iterator[Case]:
     """What has to be refused, with a word on what is wrong where."""
     x, tets = wc.box(EDGE, 1).vertices, wc.box(EDGE, 1).tets
-    twin = np.where(np.arange(8)[:, None] == 7, x[6], x)
-    nan, flat = np.where(np.arange(8)[:, None] == 3, np.nan, x), x * [1.0, 1.0, 0.0]
+    eight, fine = np.arange(8)[:, None], wc.box(EDGE, 2)
+    middle = np.abs(fine.vertices).max(axis=1, keepdims=True) < 1e-9
     meshes = {
-        "NaN in a vertex": (nan, tets),
-        "duplicate vertices, a flat tet": (twin, tets),
-        "zero-area triangles": (flat, tets),
+        "NaN in a vertex": (np.where(eight == 3, np.nan, x), tets),
+        "duplicate vertices, a flat tet": (np.where(eight == 7, x[6], x), tets),
+        "zero-area triangles": (x * [1.0, 1.0, 0.0], tets),
         "a vertex of no tet": (np.concatenate([x, [[1.0, 1.0, 1.0]]]), tets),
         "a tet that repeats a vertex": (x, np.concatenate([tets, [[0, 1, 1, 2]]])),
         "a tet twice": (x, np.concatenate([tets, tets[:1]])),
         "an index out of range": (x, np.concatenate([tets, [[0, 1, 2, 99]]])),
         "no tets": (x, tets[:0]),
-        "inverted tets in the rest shape": folded(),
+        "inverted tets in the rest shape": (fine.vertices + middle * [0.0, 0.0, EDGE], fine.tets),
         "a tet of aspect 1e8": (tip().vertices * [1.0, 1.0, 1e-8], [[0, 1, 2, 3]]),
     }
     for name, mesh in meshes.items():
         yield case(f"B11 {name}", alone, mesh, expect=REFUSED)
     yield case("B11 no bodies", setting, seconds=0.1, expect=REFUSED)
-    yield case("B11 fps 0", pair, fps=0.0, expect=REFUSED)
-    yield case("B11 fps infinite: a step of 0", pair, fps=float("inf"), expect=REFUSED)
-    yield case("B11 NaN in a velocity", pair, v=np.nan, expect=REFUSED)
-    yield case("B11 NaN in gravity", pair, gravity=(0.0, 0.0, np.nan), expect=REFUSED)
-    yield case("B11 Poisson ratio 0.5", pair, poisson=0.5, expect=REFUSED)
-    yield case("B11 density 0", pair, density=0.0, expect=REFUSED)
-    yield case("B11 E 0", pair, young=0.0, expect=REFUSED)
+    given = {
+        "fps 0": {"fps": 0.0},
+        "fps infinite: a step of 0": {"fps": np.inf},
+        "NaN in a velocity": {"v": np.nan},
+        "NaN in gravity": {"gravity": (0.0, 0.0, np.nan)},
+        "Poisson ratio 0.5": {"poisson": 0.5},
+        "density 0": {"density": 0.0},
+        "E 0": {"young": 0.0},
+    }
+    for name, argument in given.items():
+        yield case(f"B11 {name}", pair, **argument, expect=REFUSED)
 
 
 def pair(
@@ -85,7 +89,7 @@ def pair(
     **material,
 ) -> Setting:
     """A cube comes down on one that is held; lengths, speed and time scale together."""
-    rubber = soft(**{"young": 1e5, "density": 1000.0, "poisson": 0.3} | material)
+    rubber = soft(**{"poisson": 0.3} | material)
     at = np.array([far, 0.0, 0.0])
     place = at + scale * np.array([aside, aside, EDGE + gap])
     low = body(wc.box(scale * EDGE, 2), rubber, at, fixed=fixed, label="low")
@@ -108,8 +112,7 @@ def on_tip(aside: float = 0.0, cells: int = 1) -> Setting:
 def sliver(aspect: float) -> Setting:
     """A flat tet falls on the ground; its step is as short as it is thin."""
     flat = body(tip(EDGE).scaled(1.0, 1.0, 1.0 / aspect), at=2.0 * EDGE / aspect)
-    seconds = 200.0 * EDGE / aspect / 10.0
-    return setting(flat, planes=[UP], seconds=seconds, fps=100.0 * aspect)
+    return setting(flat, planes=[UP], seconds=20.0 * EDGE / aspect, fps=100.0 * aspect)
 
 
 def pulled_through() -> Setting:
@@ -123,13 +126,6 @@ def pulled_through() -> Setting:
 
     cube = body(wc.box(EDGE, 2), wc.NeoHookean(1e5, 0.4, 1000.0, 1e-3))
     return setting(cube, gravity=NONE, seconds=0.2, drive=drive)
-
-
-def folded():
-    """A cube whose middle vertex lies outside of it: its tets overlap."""
-    mesh = wc.box(EDGE, 2)
-    middle = np.abs(mesh.vertices).max(axis=1) < 1e-9
-    return mesh.vertices + np.where(middle[:, None], [0.0, 0.0, EDGE], 0.0), mesh.tets
 
 
 def alone(mesh) -> Setting:

@@ -15,48 +15,40 @@ from trials.setting import Case, Setting, case
 from warp_contact import scenes
 
 FPS = 60.0
-SQUEEZES = 0.7, 0.5, 0.3, 0.15  # of the sphere's diameter
 SPEED = 0.1  # of the upper cube [m/s]
 REST = 0.2  # between squeeze and release [s]
-LIMIT = 600.0  # seconds that the larger scenes may take
-SIDE_BY_SIDE = (0, 1), (2, 3)  # pairs of bodies
+PAIRED = {"pairs": ((0, 1), (2, 3))}  # bodies side by side
 
-DRAWS, QUICK_DRAWS = 180, 12
+DRAWS = 180
 CELLS = (3, 3), (2, 5), (4, 6), (8, 8)
 ASIDE = 0.03  # the largest shift along x and y [m]
 
 
-def cases(quick: bool) -> Iterator[Case]:
-    """B4 to B7; the quick run is shorter and takes fewer fruits."""
-    seconds, fraction = (0.5, 0.05) if quick else (2.0, 0.15)
-    on_sheet = (0, 1), (0, 2), (0, 3)
-    yield case("B4 three cubes on a membrane", paper, "cubes_on_membrane", seconds, on_sheet)
-    for part in SQUEEZES[:2] if quick else SQUEEZES:
+def cases() -> Iterator[Case]:
+    """B4 to B7."""
+    on_sheet = {"pairs": ((0, 1), (0, 2), (0, 3))}
+    yield case("B4 three cubes on a membrane", paper, "cubes_on_membrane", 2.0, on_sheet)
+    for part in (0.7, 0.5, 0.3, 0.15):
         yield case(f"B5 sphere squeezed to {part:.0%} and released", squeezed, part)
     for mu in (0.3, 0.0):
         name = f"B6 stack of nine membranes, friction {mu:g}"
-        yield case(name, paper, "membrane_stack", 0.25 * seconds, limit=LIMIT, friction=mu)
-    name = f"B7 bowl, {fraction:.0%} of the fruit"
-    yield case(name, paper, "bowl", 0.25 * seconds, (), limit=LIMIT, fraction=fraction)
-    yield case("Fig. 1 arches on slabs", paper, "sampling", seconds, SIDE_BY_SIDE, limit=LIMIT)
-    yield case("Fig. 6 two pairs of blocks", blocks, seconds)
+        yield case(name, paper, "membrane_stack", 0.5, friction=mu)
+    fruit = {"fraction": 0.15}
+    yield case("B7 bowl, 15% of the fruit", paper, "bowl", 0.5, {"pairs": ()}, **fruit)
+    yield case("Fig. 1 arches on slabs", paper, "sampling", 2.0, PAIRED)
+    inside = PAIRED | {"recovers": True}
+    yield case("Fig. 6 two pairs of blocks", paper, "two_bodies", 2.0, inside)
 
 
-def tilts(quick: bool) -> Iterator[Case]:
+def tilts() -> Iterator[Case]:
     """So many draws; the number of each is its seed."""
-    for k in range(QUICK_DRAWS if quick else DRAWS):
+    for k in range(DRAWS):
         yield case(f"B2 blocks at random tilt {k}", collide, k)
 
 
-def paper(name: str, seconds: float, pairs: tuple | None = None, **options) -> Setting:
+def paper(name: str, seconds: float, watched: dict | None = None, **options) -> Setting:
     """A scene as it is; ``options`` of its ``build``."""
-    return Setting(scenes.load(name).build(**options), seconds, FPS, pairs=pairs)
-
-
-def blocks(seconds: float) -> Setting:
-    """Blocks that start in each other; their outer ends are held."""
-    scene = scenes.load("two_bodies").build()
-    return Setting(scene, seconds, FPS, pairs=SIDE_BY_SIDE, recovers=True)
+    return Setting(scenes.load(name).build(**options), seconds, FPS, **watched or {})
 
 
 def squeezed(part: float) -> Setting:

@@ -5,18 +5,22 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from trials.outcome import OUTCOMES, Record, classify
-from trials.sweeps import MOST_STEPS, SWEEPS
+from trials.outcome import OUTCOMES, classify
+from trials.sweeps import SWEEPS
 from trials.watch import METHODS, attempt
 
-COLUMNS = (
-    *("sweep", "method", "x_name", "x", "y_name", "y", "outcome", "overlap", "energy_gained"),
-    *("lowest_volume", "end_volume", "tunnelled", "touched", "steps", "time", "asked", "reason"),
-)
-LIMIT = 30.0  # seconds that a cell may take
+FIGURES = {  # of a cell: its columns, and the fields of its record
+    "overlap": "overlap",
+    "energy_gained": "gained",
+    "lowest_volume": "lowest",
+    "end_volume": "volume",
+    **{name: name for name in ("tunnelled", "touched", "steps", "time", "asked", "reason")},
+}
+COLUMNS = "sweep", "method", "x_name", "x", "y_name", "y", "outcome", *FIGURES
+CUT = {"most_steps": 6000, "limit": 30.0}  # steps and seconds that a cell may take
 
 
-def draw(names: list[str], quick: bool, out: Path) -> int:
+def draw(names: list[str], out: Path) -> int:
     """Run the sweeps, write the table as they go and a picture after each."""
     try:
         from trials.picture import picture
@@ -28,31 +32,23 @@ def draw(names: list[str], quick: bool, out: Path) -> int:
         table = csv.writer(file)
         table.writerow(COLUMNS)
         for name in names:
-            found = {}
-            for method in METHODS:
-                found[method] = sweep(name, method, quick, table.writerow)
-                file.flush()
-            picture(SWEEPS[name], quick, found, out / f"{name}.png")
+            found = {method: sweep(name, method, table.writerow) for method in METHODS}
+            picture(SWEEPS[name], found, out / f"{name}.png")
     return 0
 
 
-def sweep(name: str, method: str, quick: bool, write) -> list[list[str]]:
+def sweep(name: str, method: str, write) -> list[list[str]]:
     """The outcomes of all cells of a method, by rows of equal y; ``write`` takes each row."""
-    s = SWEEPS[name]
-    xs, ys = (axis.tolist() for axis in s.axes(quick))
-    limits = {"most_steps": MOST_STEPS[not quick], "limit": LIMIT}
-    outcomes = []
+    s, grid = SWEEPS[name], []
+    xs, ys = (axis.tolist() for axis in s.axes())
     for y in ys:
+        grid.append([])
         for x in xs:
-            r = attempt(partial(s.build, x, y), method, **limits)
-            outcomes.append(classify(r))
-            write((name, method, s.x_name, x, s.y_name, y, *row(r)))
+            r = attempt(partial(s.build, x, y), method, **CUT)
+            grid[-1].append(classify(r))
+            figures = [getattr(r, field) for field in FIGURES.values()]
+            write((name, method, s.x[0], x, s.y[0], y, classify(r), *figures))
+    outcomes = [o for row in grid for o in row]
     counts = ", ".join(f"{o} {outcomes.count(o)}" for o in OUTCOMES if o in outcomes)
     print(f"{name:8}  {method:14}  {counts}", flush=True)
-    return [outcomes[k : k + len(xs)] for k in range(0, len(outcomes), len(xs))]
-
-
-def row(r: Record) -> tuple:
-    """The figures of a cell."""
-    state = r.overlap, r.gained, r.lowest, r.volume, r.tunnelled
-    return classify(r), *state, r.touched, r.steps, r.time, r.asked, r.reason
+    return grid

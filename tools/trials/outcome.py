@@ -1,8 +1,5 @@
 """What became of a run: the figures of it, one word for it, the level it holds.
 
-A type of its own beside ``measure.figure.Figure``: a run is judged by all of its figures together,
-the first that fails names the outcome.
-
     fine        none of the following
     refused     an error before the first step
     not finite  a position or velocity is not a number
@@ -29,6 +26,7 @@ GAIN = 0.01  # energy, of its scale: see watch.py
 FLAT = 0.0  # volume of a tet at the end, of that at rest
 EXCELLENT_SUNK, EXCELLENT_GAIN = 0.01, 0.001  # and no tet inverts on the way
 BEYOND = "beyond"  # expected of what has a meaning, but not for this method
+ELEMENTS = "body", "vertex", "tet", "face", "edge", "fps", "gravity", "substeps"
 
 
 @dataclass
@@ -62,38 +60,31 @@ class Record:
 
 def classify(r: Record) -> str:
     """The outcome of a run; a figure that is not a number is beyond its limit."""
-    failures = (
-        (REFUSED, bool(r.refused)),
-        (INFINITE, not r.finite),
-        (STOPPED, bool(r.error)),
-        (LOST, bool(r.lost) or r.tunnelled > 0),
-        (INVERTED, not r.volume > FLAT),
-        (ENERGY, not r.gained <= GAIN),
-        (OVERLAP, not r.overlap <= SUNK),
-    )
-    return next((name for name, failed in failures if failed), FINE)
+    failures = {
+        REFUSED: bool(r.refused),
+        INFINITE: not r.finite,
+        STOPPED: bool(r.error),
+        LOST: bool(r.lost) or r.tunnelled > 0,
+        INVERTED: not r.volume > FLAT,
+        ENERGY: not r.gained <= GAIN,
+        OVERLAP: not r.overlap <= SUNK,
+    }
+    return next((name for name, failed in failures.items() if failed), FINE)
 
 
 def level(r: Record, expect: str = FINE) -> str:
     """The level of a run.
 
-    Args:
-        r: its figures
-        expect: ``fine``, ``refused``, or ``beyond``, where a refusal is good at most; it has to
-            name what is refused
+    It is expected to be ``fine``, ``refused``, or ``beyond``, where a refusal is good at most. A
+    refusal has to name the vertex, tet, face, edge or argument that is wrong.
     """
     found = classify(r)
+    named = any(word in r.refused for word in ELEMENTS)
     if expect == BEYOND:
-        return GOOD if found == REFUSED and names_element(r.refused) else MISSED
+        return GOOD if found == REFUSED and named else MISSED
     if found != expect:
         return MISSED
     if found == REFUSED:
-        return EXCELLENT if names_element(r.refused) else GOOD
+        return EXCELLENT if named else GOOD
     clean = r.overlap <= EXCELLENT_SUNK and r.gained <= EXCELLENT_GAIN and r.lowest > FLAT
     return EXCELLENT if clean else GOOD
-
-
-def names_element(message: str) -> bool:
-    """Whether an error says which vertex, tet, face, edge or argument is wrong."""
-    words = "body", "vertex", "tet", "face", "edge", "fps", "gravity", "substeps"
-    return any(word in message for word in words)

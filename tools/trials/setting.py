@@ -3,14 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 import warp_contact as wc
 from trials.outcome import FINE
 
-G = 9.81  # [m/s^2]
-DOWN, NONE, UP = (0.0, 0.0, -G), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+DOWN, NONE, UP = (0.0, 0.0, -9.81), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 BASE = 0.01  # of its height: vertices that are no further from its lowest ones are a body's base
 
 
@@ -30,19 +30,17 @@ class Setting:
     drive: Callable | None = None  # called before each frame; the energy is then not judged
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """A setting, and what ought to come of it."""
 
     name: str  # number in the specification and a few words
     build: Callable[[], Setting]  # raises ValueError where the input is refused
     expect: str = FINE  # or ``refused``, or ``beyond``: refused though it has a meaning
-    limit: float = 120.0  # seconds that it may take
 
 
-def case(name: str, build: Callable, *args, expect=FINE, limit=120.0, **named) -> Case:
+def case(name: str, build: Callable, *args, expect=FINE, **named) -> Case:
     """The case whose setting is ``build(*args, **named)``."""
-    return Case(name, partial(build, *args, **named), expect, limit)
+    return Case(name, partial(build, *args, **named), expect)
 
 
 def soft(young: float = 1e5, density: float = 1000.0, poisson: float = 0.4) -> wc.NeoHookean:
@@ -59,7 +57,7 @@ def body(mesh: wc.TetMesh, material=None, at=NONE, turn=(0.0, 0.0, 0.0, 1.0), v=
         at: where it is put [m]; a number is its height
         turn: as a quaternion
         v: velocity [m/s]; a number is that upwards
-        more: ``fixed``, "base" for its lowest vertices, and ``label``
+        more: the others; ``fixed`` may be "base", its lowest vertices
     """
     if isinstance(more.get("fixed"), str):
         z = mesh.vertices[:, 2]

@@ -15,7 +15,6 @@ from trials.setting import NONE, UP, Case, Setting, body, case, setting, soft
 
 DROP = 1e-4  # [m]
 GAP, SPEED = 0.01, 0.5  # [m], [m/s]
-FIRST_EDGES = 10.0, 8.0, 4.0, 2.0, 1.0  # of the cubes of a pyramid [m]
 PAIRS = {  # lower and upper body, each turned
     "point on triangle": (tip, UPSIDE_DOWN, tip, both(about("z", 20.0), UPSIDE_DOWN)),
     "triangle on point": (tip, AS_IS, tip, AS_IS),
@@ -26,8 +25,8 @@ PAIRS = {  # lower and upper body, each turned
 }
 
 
-def spikes(quick: bool) -> Iterator[Case]:
-    """All ten, with single and with many tets where a floor is in play."""
+def spikes() -> Iterator[Case]:
+    """B1, with single and with many tets where a floor is in play."""
     turned = both(about("z", 90.0), UPSIDE_DOWN)
     yield case("B1.1 spike on spike", onto, spike, spike)
     yield case("B1.2 spike on wedge", onto, wedge, spike)
@@ -43,7 +42,7 @@ def spikes(quick: bool) -> Iterator[Case]:
     cliff = body(wc.box(4.0, 1), soft(1e6), (-2.0, 0.0, -2.0), fixed=True)
     cube = body(wc.box(1.0, 1), at=(-0.1, 0.0, 0.6), turn=about("z", 20.0))
     yield case("B1.9 cube on the edge of a cliff", setting, cliff, cube, friction=1.0, seconds=1.5)
-    for cells in (1, 4) if quick else (1, 4, 9):
+    for cells in (1, 4, 9):
         mesh = wc.box((8.0, 4.0, 1.0), (2 * cells, cells, 1))
         floor = body(mesh, soft(1e6), (2.0, 0.0, -0.5), fixed=True)
         cube = body(wc.box(1.0, 1), at=(-1.0, 0.0, 0.5 + DROP), v=(2.0, 0.0, 0.0))
@@ -51,8 +50,8 @@ def spikes(quick: bool) -> Iterator[Case]:
         yield case(name, setting, floor, cube, friction=0.0, seconds=1.5)
 
 
-def primitives(quick: bool) -> Iterator[Case]:
-    """Every pair; the quick run leaves out the slow pyramid."""
+def primitives() -> Iterator[Case]:
+    """B2."""
     for name, pair in PAIRS.items():
         yield case(f"B2 {name}", meet, *pair)
         yield case(f"B2 {name}, aside", meet, *pair, aside=(0.07, 0.04))
@@ -67,12 +66,12 @@ def primitives(quick: bool) -> Iterator[Case]:
     yield case("B2 cube in a corner, clearance 0.005", setting, cube, **leaning)
     for clearance in (5e-3, 5e-7):
         yield case(f"B2 tet in a slot, clearance {clearance:g}", slot, clearance)
-    if not quick:
-        middle = np.cumsum(FIRST_EDGES) - 0.5 * np.array(FIRST_EDGES) + 0.01 * np.arange(5)
-        sizes = zip(FIRST_EDGES, middle.tolist(), strict=True)
-        cubes = [body(wc.box(edge, 2), soft(1e6), z) for edge, z in sizes]
-        run = {"friction": 0.5, "planes": [UP], "seconds": 2.0}
-        yield case("B2 pyramid of five cubes", setting, *cubes, **run)
+    edges = np.array([10.0, 8.0, 4.0, 2.0, 1.0])
+    middle = np.cumsum(edges) - 0.5 * edges + 0.01 * np.arange(5)
+    sizes = zip(edges.tolist(), middle.tolist(), strict=True)
+    cubes = [body(wc.box(edge, 2), soft(1e6), z) for edge, z in sizes]
+    run = {"friction": 0.5, "planes": [UP], "seconds": 2.0}
+    yield case("B2 pyramid of five cubes", setting, *cubes, **run)
 
 
 def onto(low, high, turn=UPSIDE_DOWN) -> Setting:

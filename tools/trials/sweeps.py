@@ -1,7 +1,7 @@
 """Sweeps of two numbers to the point of failure, on scenes of two small bodies."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,29 +9,25 @@ import warp_contact as wc
 from trials import outcome
 from trials.setting import NONE, Setting, body, setting, soft
 
-COARSE, FINE = 5, 11  # cells along each side
+CELLS = 11  # along each side
 EDGE = 0.1  # of a block [m]
 FRAMES = 60
-MOST_STEPS = 600, 6000  # of a cell in a quick and in a full run; a run that is cut says so
+Axis = tuple[str, float, float]  # its name with its unit, first and last value: by equal factors
 
 
-@dataclass(frozen=True)
-class Sweep:
+class Sweep(NamedTuple):
     """What is swept, and how."""
 
     title: str
-    x_name: str  # with its unit
-    y_name: str
-    x: tuple[float, float]  # first and last value, spaced by equal factors
-    y: tuple[float, float]
+    x: Axis
+    y: Axis
     build: Callable[[float, float], Setting]  # of a cell
     # Where something else than contact decides: its name, and y at each x.
     limit: tuple[str, Callable[[np.ndarray], np.ndarray]] | None = None
 
-    def axes(self, quick: bool) -> tuple[np.ndarray, np.ndarray]:
+    def axes(self) -> tuple[np.ndarray, np.ndarray]:
         """The values of both."""
-        n = COARSE if quick else FINE
-        return np.geomspace(*self.x, n), np.geomspace(*self.y, n)
+        return np.geomspace(*self.x[1:], CELLS), np.geomspace(*self.y[1:], CELLS)
 
 
 def step_stiffness(step: float, young: float) -> Setting:
@@ -56,10 +52,7 @@ def mass_stiffness(mass: float, young: float) -> Setting:
 
 
 def overlap_thickness(overlap: float, thick: float) -> Setting:
-    """A block starts in a plate; both lengths as parts of its edge.
-
-    Where the overlap is above the thickness it sticks out of the far face.
-    """
+    """A block starts in a plate; both lengths as parts of its edge."""
     plate = body(wc.box((2.0 * EDGE, 2.0 * EDGE, thick * EDGE), (4, 4, 1)))
     block = body(wc.box(EDGE, 3), at=(0.004, 0.003, (0.5 * thick + 0.5 - overlap) * EDGE))
     run = {"seconds": 0.3, "fps": FRAMES / 0.3, "recovers": True}
@@ -86,22 +79,29 @@ def fixed_steps(*bodies: dict, seconds: float, step: float) -> Setting:
 SWEEPS = {
     "step": Sweep(
         "two blocks collide at 1 m/s, fixed step",
-        *("step [s]", "Young's modulus [Pa]", (1e-4, 1e-2), (1e3, 1e7), step_stiffness),
+        ("step [s]", 1e-4, 1e-2),
+        ("Young's modulus [Pa]", 1e3, 1e7),
+        step_stiffness,
     ),
     "ratio": Sweep(
         "a block falls on another, step left to the solver",
-        *("mass ratio", "stiffness ratio", (1.0, 1e4), (1e-4, 1e4), mass_stiffness),
+        ("mass ratio", 1.0, 1e4),
+        ("stiffness ratio", 1e-4, 1e4),
+        mass_stiffness,
         # Between the cells where it goes inside out, also if held at its base, and those where not.
-        limit=("the upper block's weight is 25 of its moduli", lambda mass: mass / 2.5e5),
+        ("the upper block's weight is 25 of its moduli", lambda mass: mass / 2.5e5),
     ),
     "depth": Sweep(
         "a block starts in a plate",
-        *("overlap at the start [of an edge]", "thickness [of an edge]"),
-        *((0.01, 0.5), (0.03, 1.0), overlap_thickness),
+        ("overlap at the start [of an edge]", 0.01, 0.5),
+        ("thickness [of an edge]", 0.03, 1.0),
+        overlap_thickness,
     ),
     "speed": Sweep(
         "a block hits a plate of 0.004 m, fixed step",
-        *("speed [m/s]", "step [s]", (0.1, 100.0), (1e-4, 1e-2), speed_step),
+        ("speed [m/s]", 0.1, 100.0),
+        ("step [s]", 1e-4, 1e-2),
+        speed_step,
     ),
 }
 
@@ -115,8 +115,9 @@ def frontier(grid: list[list[str]]) -> list[tuple[tuple, tuple]]:
     return sides + [((i - 0.5, i + 0.5), (j + 0.5, j + 0.5)) for j, i in above]
 
 
-def limit_line(s: Sweep, xs: np.ndarray, ys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def limit_line(s: Sweep) -> tuple[np.ndarray, np.ndarray]:
     """The line of the sweep's limit in cells, x and y, as far as it lies on the map."""
+    xs, ys = s.axes()
     last = len(ys) - 1
     y = last * np.log(s.limit[1](xs) / ys[0]) / np.log(ys[-1] / ys[0])
     on = (y >= -0.5) & (y <= last + 0.5)

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 
 import numpy as np
-from verification.setup import mean_edge
+from verification.setup import masses, mean_edge
 
 import warp_contact as wc
 from trials.outcome import SUNK, Record
@@ -25,6 +25,7 @@ from trials.setting import UP, Setting
 
 FACTORS = 0.01, 0.1, 1.0, 10.0, 100.0  # of E l, the stiffness of the softest body's tets
 METHODS = "surface", "literal", *(f"penalty {f:g}" for f in FACTORS)
+LIMIT = 600.0  # seconds that a run may take
 FLOOR = 1e-8
 RUNAWAY = 100.0  # gain of energy after which a run is not followed further
 ACROSS = 0.5  # of the wider body's middle extent: "in front of" is nearer to the line than this
@@ -35,7 +36,7 @@ def attempt(
     build: Callable[[], Setting],
     method: str = METHODS[0],
     most_steps: int = 10**9,
-    limit: float = 1e6,
+    limit: float = LIMIT,
 ) -> Record:
     """Build a setting and run it to its end or its first failure for good.
 
@@ -51,11 +52,7 @@ def attempt(
         r.asked = setting.seconds
         answer = response(method, setting.scene)
         sim = wc.Simulation(setting.scene, answer, setting.fps, setting.substeps)
-    except ValueError as error:
-        r.refused = str(error)
-        return r
-    watch = Watch(sim, setting, r)
-    try:
+        watch = Watch(sim, setting, r)
         with alarm(limit):
             for _ in range(round(setting.seconds * setting.fps)):
                 if setting.drive:
@@ -64,27 +61,24 @@ def attempt(
                 watch.look()
                 if not r.finite or r.lost or r.gained > RUNAWAY or r.steps >= most_steps:
                     break
-    except wc.SimulationError as error:
-        if sim.substeps == 0:
+    except (ValueError, wc.SimulationError) as error:
+        if sim is None or sim.substeps == 0:
             r.refused = str(error)
         else:
             r.error, r.finite = str(error), "finite" not in str(error)
     except TimeoutError:
         r.error = f"frame {sim.frame + 1}: not done after {limit:g} s"
-    except Exception as error:  # no run should end like this: it is an outcome, with its kind
-        r.error = f"frame {sim.frame + 1}: {type(error).__name__}: {error}"
     return r
 
 
 def response(method: str, scene: wc.Scene):
     """The response of a method; a penalty's stiffness is a factor of E l, l a mean edge [N/m]."""
-    if method == "surface":
-        return wc.ContactSurface()
-    if method == "literal":
-        return wc.ContactSurface("literal")
+    name, *factor = method.split()
+    if not factor:
+        return wc.ContactSurface("literal" if name == "literal" else "balanced")
     mobile = [b for b in scene.bodies if not b.fixed.all()]
     stiffness = min(b.material.youngs_modulus * mean_edge(b.mesh) for b in mobile)
-    return wc.Penalty(float(method.split()[1]) * stiffness)
+    return wc.Penalty(float(factor[0]) * stiffness)
 
 
 class Watch:
@@ -92,8 +86,7 @@ class Watch:
 
     def __init__(self, sim: wc.Simulation, setting: Setting, record: Record | None = None):
         """Remember the start."""
-        self.sim, self.setting = sim, setting
-        self.record = record or Record(asked=setting.seconds)
+        self.sim, self.setting, self.record = sim, setting, record or Record()
         bodies = sim.scene.bodies
         extents = np.sort([np.ptp(b.mesh.vertices, axis=0) for b in bodies], axis=1)
         self.size, self._width = float(extents[:, 0].min()), extents[:, 1]
@@ -134,22 +127,17 @@ class Watch:
     def _pop(self, elastic: float) -> None:
         """What the bodies have gained that started in each other."""
         r, closed = self.record, self.setting.held
-        self._flight = max(self._flight, self._flight_energy())
-        self._elastic = max(self._elastic, elastic)
+        m, v = masses(self.sim), self.sim.velocities().astype(float)
+        first = self.sim.model.body_vert.numpy()[:-1]
+        p = np.add.reduceat(m[:, None] * v, first)  # momentum of each body
+        flight = float((0.5 * np.einsum("bi,bi->b", p, p) / np.add.reduceat(m, first)).sum())
+        self._flight, self._elastic = max(self._flight, flight), max(self._elastic, elastic)
         held = max(self._elastic, closed)
         r.gained = max(0.0, (self._flight - held) / (held + self._scale))
         if closed > 0.0:
             seen = self._flight / self._elastic if self._elastic > 0.0 else np.inf
             r.note = f"motion {self._flight / closed:.2f} of what the overlap holds closed, "
             r.note += f"{seen:.2f} of the elastic energy seen"
-
-    def _flight_energy(self) -> float:
-        """Kinetic energy of the centres of mass of the bodies [J]."""
-        mass, v = self.sim.model.mass.numpy().astype(float), self.sim.velocities().astype(float)
-        first = self.sim.model.body_vert.numpy()[:-1]
-        m = np.add.reduceat(mass, first)
-        p = np.add.reduceat(mass[:, None] * v, first)
-        return float((0.5 * np.einsum("bi,bi->b", p, p) / m).sum())
 
     def _wrong_side(self) -> str:
         """Who is on whose wrong side."""

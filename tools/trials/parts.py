@@ -1,4 +1,4 @@
-"""Cases of which each gets worse where some part of the method is off."""
+"""The cases of ``tools/ablation.py``: each gets worse where some part of the method is off."""
 
 import math
 from collections.abc import Callable
@@ -9,13 +9,13 @@ from unittest import mock
 
 import numpy as np
 import warp as wp
-from trials import figures, limits, loads, sweeps
-from trials.setting import NONE, body, scene, soft
-from trials.watch import attempt
 from verification import collision, surface, weight
 from verification.setup import Ask, on_face
 
 import warp_contact as wc
+from trials import figures, limits, loads, sweeps
+from trials.setting import NONE, body, scene, soft
+from trials.watch import attempt
 from warp_contact.kernels.impulse import impulse as impulse_kernels
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
 from warp_contact.step import impulse
@@ -39,14 +39,10 @@ class Case(NamedTuple):
 
 
 GAIN = 1e-3  # of the energy: what a pile of roundings and closures may add
-OVERLAP = Quantity(
-    "deepest overlap [% of an edge]",
-    100.0 * float(CLOSURE_TOLERANCE),  # what is left on purpose
-)
-SPIN = Quantity(
-    "angular momentum [of sum m |x| |v|]",
-    1e-6,  # a walk of float32 over a thousand steps
-)
+LEFT = 100.0 * float(CLOSURE_TOLERANCE)  # % of an edge: an overlap that is left on purpose
+ROUNDED = 1e-6  # of the angular momentum: a walk of float32 over a thousand steps
+OVERLAP = Quantity("deepest overlap [% of an edge]", LEFT)
+SPIN = Quantity("angular momentum [of sum m |x| |v|]", ROUNDED)
 GAINED = Quantity("energy gained [of that at the start]", GAIN)
 RISE = Quantity("energy gained [of that stored]", GAIN)
 INSERTED = Quantity("energy that it puts in [J]", 1e-3)

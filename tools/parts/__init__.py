@@ -1,1 +1,0 @@
-"""Cases and the parts they need, of ``tools/ablation.py``."""

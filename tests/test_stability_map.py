@@ -9,7 +9,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
-from trials import loads, maps, outcome, sweeps
+import stability
+import trials
+from trials import loads, outcome, sweeps
 from trials.outcome import classify
 from trials.watch import METHODS, attempt
 
@@ -55,10 +57,10 @@ def test_the_line_of_a_limit_ends_at_the_rim_of_the_map():
 
 
 def test_the_map_writes_a_row_per_cell_and_a_picture(tmp_path, monkeypatch):
-    pytest.importorskip("matplotlib")
+    maps = pytest.importorskip("trials.maps")
     monkeypatch.setattr(maps, "METHODS", METHODS[:2])
     monkeypatch.setattr(sweeps, "CELLS", 2)
-    assert maps.draw(["speed"], tmp_path) == 0
+    maps.draw(["speed"], tmp_path)
     rows = (tmp_path / "map.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * 4
     assert (tmp_path / "speed.png").stat().st_size > 1000
@@ -66,9 +68,14 @@ def test_the_map_writes_a_row_per_cell_and_a_picture(tmp_path, monkeypatch):
 
 def test_without_matplotlib_the_map_says_so(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.delitem(sys.modules, "trials.picture", raising=False)
-    assert maps.draw(["speed"], tmp_path / "map") == 1
+    monkeypatch.delitem(sys.modules, "trials.maps", raising=False)
+    monkeypatch.delattr(trials, "maps", raising=False)
+    monkeypatch.setattr(
+        sys, "argv", ["stability.py", "map", "speed", "--out", str(tmp_path / "map")]
+    )
+    assert stability.main() == 1
     assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "map").exists()
 
 
 @pytest.mark.slow

@@ -87,12 +87,13 @@ def summary(timings: dict[str, Timing]) -> dict[str, float]:
 def sleep_figures(device: str | None) -> dict[str, float]:
     """What a frame of blocks costs settling, at rest and asleep, and what sleep changes."""
     awake, asleep = (Simulation(blocks(), sleeping=s, device=device) for s in (False, True))
-    settling = frame_ms(awake, SETTLING)
+    settling = frame_times(awake, SETTLING)
     while asleep.frame < REST or (asleep.state.v.numpy().any() and asleep.frame < LONG):
         asleep.step_frame()
     while awake.frame < asleep.frame:
         awake.step_frame()
-    resting, sleeping = frame_ms(awake, SAMPLE), frame_ms(asleep, SAMPLE)
+    times = settling, frame_times(awake, SAMPLE), frame_times(asleep, SAMPLE)
+    settling, resting, sleeping = 1e3 * np.median(times, axis=1)
     apart = np.abs(awake.positions() - asleep.positions()).max() / awake.model.body_edge.numpy()[0]
     return {
         "settling ms": settling,
@@ -102,11 +103,6 @@ def sleep_figures(device: str | None) -> dict[str, float]:
         "frames until all sleep": float(asleep.frame - SAMPLE),
         "sleep moved, of an edge": float(apart),
     }
-
-
-def frame_ms(sim: Simulation, frames: int) -> float:
-    """Median time of the next frames [ms]."""
-    return 1e3 * float(np.median(frame_times(sim, frames)))
 
 
 if __name__ == "__main__":

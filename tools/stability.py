@@ -14,7 +14,7 @@ from pathlib import Path
 from measure.figure import MISSED
 from measure.report import Table
 from measure.run import command_line, one_of
-from trials import degenerate, figures, limits, loads, maps, shapes
+from trials import degenerate, figures, limits, loads, shapes
 from trials.outcome import classify, level
 from trials.sweeps import SWEEPS
 from trials.watch import METHODS, attempt
@@ -48,7 +48,13 @@ def main() -> int:
     part.add_argument("--out", type=Path, default=OUT, help="folder of the table and the pictures")
     args = parser.parse_args()
     if args.part == "map":
-        return maps.draw(args.names or list(SWEEPS), args.out)
+        try:
+            from trials import maps
+        except ImportError:
+            print("no matplotlib: pip install 'warp_contact[plot]'", file=sys.stderr)
+            return 1
+        maps.draw(args.names or list(SWEEPS), args.out)
+        return 0
     print(f"response {args.response}\n{TABLE.head()}")
     missed = 0
     for case in (case for family in args.names or FAMILIES for case in FAMILIES[family]()):

@@ -1,4 +1,4 @@
-"""The Warp arrays behind a simulation: their bytes, and a copy to come back to."""
+"""The Warp arrays behind a simulation, and their bytes."""
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
@@ -11,14 +11,12 @@ def arrays(holder) -> Iterator[wp.array]:
     if isinstance(holder, wp.array):
         yield holder
     elif is_dataclass(holder):
-        for field in fields(holder):
-            yield from arrays(getattr(holder, field.name))
+        yield from arrays(tuple(getattr(holder, field.name) for field in fields(holder)))
     elif isinstance(holder, tuple):
         for item in holder:
             yield from arrays(item)
     elif hasattr(holder, "_cls"):  # an instance of a wp.struct
-        for name in holder._cls.vars:
-            yield from arrays(getattr(holder, name))
+        yield from arrays(tuple(getattr(holder, name) for name in holder._cls.vars))
 
 
 def held(*holders) -> int:
@@ -29,16 +27,3 @@ def held(*holders) -> int:
         total += max(0, end - max(a.ptr or 0, last))
         last = max(last, end)
     return total
-
-
-class Snapshot:
-    """The contents of all arrays of some holders at one moment."""
-
-    def __init__(self, *holders):
-        """Copy them."""
-        self._copies = [(a, wp.clone(a)) for a in arrays(holders) if a.size]
-
-    def restore(self) -> None:
-        """Put the contents back."""
-        for a, copy in self._copies:
-            wp.copy(a, copy)

@@ -6,9 +6,9 @@ one element, both just before it: what remains is the work itself, without Pytho
 clock is that of the thread, which stands still while others have the core.
 """
 
-import sys
 from contextlib import ExitStack
 from time import perf_counter, thread_time
+from traceback import walk_stack
 from typing import NamedTuple
 from unittest import mock
 
@@ -101,11 +101,6 @@ def milliseconds(device: wp.Device, function, *args, **kwargs) -> float:
 
 
 def _stage() -> str:
-    frame = sys._getframe(1)
-    while frame:
-        module = frame.f_globals.get("__name__", "")
-        if module.startswith(ROOM):
-            stage = module.removeprefix(ROOM)
-            return ALONE if stage == "step" else stage
-        frame = frame.f_back
-    return OTHER
+    modules = (frame.f_globals.get("__name__", "") for frame, _ in walk_stack(None))
+    stage = next((m.removeprefix(ROOM) for m in modules if m.startswith(ROOM)), OTHER)
+    return ALONE if stage == "step" else stage

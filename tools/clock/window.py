@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import warp as wp
 
-from clock.memory import Snapshot, held
+from clock.memory import arrays, held
 from clock.timer import Operation, StageTimer, milliseconds
 from warp_contact import Simulation
 from warp_contact.step.forces import share_for, stages_for
@@ -108,11 +108,12 @@ class _Window:
         self.step = step_of(sim.response, bool(stepper.overlapping))
         stages = stages_for(stepper.rates[1], stepper.dt)
         self._arguments = sim.model, sim.state, self._work, stages
-        self._start = Snapshot(sim.state, self._work)
+        self._start = [(a, wp.clone(a)) for a in arrays((sim.state, self._work)) if a.size]
         self.contacts: list[int] = []
 
     def restore(self) -> None:
-        self._start.restore()
+        for a, copy in self._start:
+            wp.copy(a, copy)
         self._work.broad_phase.bodies.refit()
         self._work.broad_phase.surface.refit()
 

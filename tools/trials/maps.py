@@ -1,12 +1,17 @@
-"""The maps: a table with a row per cell, and a picture per sweep (``picture.py``)."""
+"""The maps: a table with a row per cell, and a picture per sweep."""
 
 import csv
-import sys
 from functools import partial
 from pathlib import Path
 
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.colors import ListedColormap
+
 from trials.outcome import OUTCOMES, classify
-from trials.sweeps import SWEEPS
+from trials.sweeps import SWEEPS, Sweep, frontier, limit_line
 from trials.watch import METHODS, attempt
 
 FIGURES = {  # of a cell: its columns, and the fields of its record
@@ -18,15 +23,14 @@ FIGURES = {  # of a cell: its columns, and the fields of its record
 }
 COLUMNS = "sweep", "method", "x_name", "x", "y_name", "y", "outcome", *FIGURES
 CUT = {"most_steps": 6000, "limit": 30.0}  # steps and seconds that a cell may take
+COLOURS = "#dcefdc", "#f6d55c", "#ed8b3b", "#c0392b", "#5b2c6f", "#8d99a6", "#1b1b1b", "#ffffff"
+SHADES = {"cmap": ListedColormap(COLOURS), "vmin": -0.5, "vmax": len(OUTCOMES) - 0.5}
+LINE = {"color": "black", "linewidth": 2.0}
+DOTS = {"color": "black", "linewidth": 1.5, "linestyle": ":"}
 
 
-def draw(names: list[str], out: Path) -> int:
+def draw(names: list[str], out: Path) -> None:
     """Run the sweeps, write the table as they go and a picture after each."""
-    try:
-        from trials.picture import picture
-    except ImportError:
-        print("no matplotlib: pip install 'warp_contact[plot]'", file=sys.stderr)
-        return 1
     out.mkdir(parents=True, exist_ok=True)
     with open(out / "map.csv", "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
@@ -34,7 +38,6 @@ def draw(names: list[str], out: Path) -> int:
         for name in names:
             found = {method: sweep(name, method, table.writerow) for method in METHODS}
             picture(SWEEPS[name], found, out / f"{name}.png")
-    return 0
 
 
 def sweep(name: str, method: str, write) -> list[list[str]]:
@@ -52,3 +55,36 @@ def sweep(name: str, method: str, write) -> list[list[str]]:
     counts = ", ".join(f"{o} {outcomes.count(o)}" for o in OUTCOMES if o in outcomes)
     print(f"{name:8}  {method:14}  {counts}", flush=True)
     return grid
+
+
+def picture(s: Sweep, found: dict[str, list[list[str]]], path: Path) -> None:
+    """A panel per method with the outcomes of its cells; they share a legend."""
+    figure, axes = plt.subplots(2, 4, figsize=(16, 8), layout="constrained")
+    figure.suptitle(s.title)
+    for ax, (method, grid) in zip(axes.flat, found.items(), strict=False):
+        ax.set_title(method)
+        panel(ax, s, grid)
+    legend = axes.flat[-1]
+    legend.axis("off")
+    for outcome, colour in zip(OUTCOMES, COLOURS, strict=True):
+        legend.scatter([], [], s=120, marker="s", color=colour, edgecolor="grey", label=outcome)
+    legend.plot([], [], label="frontier of what is fine", **LINE)
+    if s.limit:
+        legend.plot([], [], label=s.limit[0], **DOTS)
+    legend.legend(loc="center", fontsize=10)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def panel(ax, s: Sweep, grid: list[list[str]]) -> None:
+    """Colours of the outcomes, a line around what is fine, the limit."""
+    ax.imshow([[OUTCOMES.index(o) for o in row] for row in grid], origin="lower", **SHADES)
+    for ends in frontier(grid):
+        ax.plot(*ends, **LINE)
+    if s.limit:
+        ax.plot(*limit_line(s), **DOTS)
+    xs, ys = s.axes()
+    ax.set_xticks(range(len(xs)), [f"{x:.2g}" for x in xs], rotation=90)
+    ax.set_yticks(range(len(ys)), [f"{y:.2g}" for y in ys])
+    ax.set_xlabel(s.x[0])
+    ax.set_ylabel(s.y[0])

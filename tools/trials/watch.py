@@ -15,6 +15,7 @@ does, over that, stands for the rise.
 import signal
 from collections.abc import Callable
 from contextlib import contextmanager
+from traceback import walk_stack
 
 import numpy as np
 from verification.setup import masses, mean_edge
@@ -162,11 +163,9 @@ def alarm(seconds: float):
     """Raise TimeoutError in the body after so long: a frame may ask for any number of steps."""
 
     def ring(_, frame):
-        while frame:
-            if frame.f_code.co_name == "__del__":  # where an exception would be lost
-                signal.setitimer(signal.ITIMER_REAL, AGAIN)
-                return
-            frame = frame.f_back
+        if any(f.f_code.co_name == "__del__" for f, _ in walk_stack(frame)):  # would be lost there
+            signal.setitimer(signal.ITIMER_REAL, AGAIN)
+            return
         raise TimeoutError
 
     before = signal.signal(signal.SIGALRM, ring)

@@ -28,8 +28,8 @@ def part():
 
     def make(kept: float, off: float, least: float = 0.0) -> Part:
         figure, bound = Quantity("figure", least), search.SEARCH_BOUND
-        case = Case("case", lambda: {figure: kept if search.SEARCH_BOUND == bound else off})
-        return Part("name", number(search, "SEARCH_BOUND", 1.0), case, figure)
+        case = Case("case", figure, lambda: kept if search.SEARCH_BOUND == bound else off)
+        return Part("name", number(search, "SEARCH_BOUND", 1.0), case)
 
     return make
 
@@ -54,9 +54,9 @@ def test_a_figure_that_is_not_finite_is_worse_than_any(part, off):
 def test_a_run_that_stops_early_is_worse_than_any(part):
     from warp_contact import SimulationError
 
-    figure = Quantity("figure", 0.0)
-    case = Case("case", mock.Mock(side_effect=[{figure: 1.0}, SimulationError("not finite")]))
-    stops = Part("name", number(search, "SEARCH_BOUND", 1.0), case, figure)
+    run = mock.Mock(side_effect=[1.0, SimulationError("not finite")])
+    case = Case("case", Quantity("figure", 0.0), run)
+    stops = Part("name", number(search, "SEARCH_BOUND", 1.0), case)
     assert ablation.compare(stops).ratio == math.inf
 
 
@@ -104,13 +104,13 @@ def test_a_switch_is_refused_where_there_is_no_such_part_or_it_is_off():
 @pytest.mark.parametrize("name", ["entry", "deep end"])
 def test_a_constant_of_a_kernel_is_another_one_and_then_the_same_again(name):
     part = PARTS[name]
-    before = part.case.run()[part.figure]
+    before = part.case.run()
     with part.off():
-        without_it = part.case.run()[part.figure]
+        without_it = part.case.run()
     print(before, without_it)
     # 1 % of an edge was seen, and 0.26 %, each at one place and in many frames.
     assert before < 0.1 < without_it
-    assert part.case.run()[part.figure] == before
+    assert part.case.run() == before
 
 
 def test_tilted_blocks_need_contacts_of_edges():

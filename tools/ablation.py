@@ -26,7 +26,7 @@ import warp as wp
 from measure.report import Table
 from measure.run import command_line, one_of
 from trials import parts
-from trials.parts import Case, Found, Quantity
+from trials.parts import Case
 
 from warp_contact import SimulationError
 from warp_contact.data.switches import without
@@ -35,6 +35,7 @@ from warp_contact.kernels.impulse import constraint, tangent
 from warp_contact.kernels.narrow_phase import edge_contact, edges, vertex_contact
 from warp_contact.step import search
 
+INF = math.inf
 WORTH = 1.5  # without over with: a part below it is not worth its lines
 WIDTHS = {"part": 34, "case": 33, "figure": 41, "with": 9, "without": 9, "ratio": 9}
 TABLE = Table(**WIDTHS, said=0)
@@ -46,7 +47,6 @@ class Part(NamedTuple):
     name: str
     off: Callable  # a context in which it is off
     case: Case
-    figure: Quantity  # of that case
 
 
 @contextmanager
@@ -78,47 +78,35 @@ def number(owner: ModuleType, name: str, value: float) -> Callable:
     return partial(mock.patch.object, owner, name, value)
 
 
-_untwisted = switch("closure torque")
-_planes = switch("old planes")
-_kept = switch("broad phase kept")
-_wide = kernel(constraint, "WIDE", math.inf)
-_torque = kernel(constraint, "TURN", -1.0)
-_counted = kernel(constraint, "COUNTED", 0.0)
-_ramp = kernel(tangent, "UPRIGHT", 2.0, constraint)
-_entry = kernel(vertex_contact, "ASTRAY", 0.0)
 _deep_end = kernel(edge_contact, "ASIDE", 0.0, edges)
-_bound = number(search, "SEARCH_BOUND", math.inf)
+_counted = kernel(constraint, "COUNTED", 0.0)
 _deep = number(step_bounds, "LINGERING", step_bounds.TRAVEL)
-_thin = number(step_bounds, "REACH", math.inf)
-_repeats = number(step_bounds, "UNSTABLE", math.inf)
-_within = number(stepper, "PART", 10**9)
-_steady = number(step_bounds, "KEEP", 0.0)
-
+_repeats = number(step_bounds, "UNSTABLE", INF)
 _rows = {
-    "edges": ("contacts of edges", switch("edges"), parts.CORNERS, parts.OVERLAP),
-    "layers": ("depth behind the border", switch("layers"), parts.DEEP, parts.INSERTED),
-    "search": ("search for the surface", switch("search"), parts.OVERLAPPING, parts.PLACE),
-    "bound": ("bound of a move in the search", _bound, parts.DEEP, parts.INSERTED),
-    "closure": ("closure", switch("closure"), parts.CORNERS, parts.OVERLAP),
-    "look": ("second look, after the closure", switch("second look"), parts.FINE, parts.OVERLAP),
-    "closure torque": ("torque of the closure", _untwisted, parts.CORNERS, parts.SPIN),
-    "strays": ("vertices that left their triangles", switch("strays"), parts.FINE, parts.OVERLAP),
-    "entry": ("back by the side it came in by", _entry, parts.RIM, parts.OVERLAP),
-    "deep end": ("edges led out by their deep end", _deep_end, parts.ASIDE, parts.OVERLAP),
-    "wide": ("no friction across wide gaps", _wide, parts.ROUGH_RIM, parts.SPIN),
-    "torque": ("torque of friction across a gap", _torque, parts.OBLIQUE, parts.SPIN),
-    "counted": ("weight of that torque in the sweeps", _counted, parts.CORNER, parts.GAINED),
-    "ramp": ("ramps of facets", _ramp, parts.BENT, parts.GAINED),
-    "planes": ("planes that the closure leaves out", _planes, parts.SEAM, parts.GAINED),
-    "warm": ("warm start", switch("warm start"), parts.SHEET, parts.SWEEPS),
-    "hold": ("persistent edges", switch("persistent edges"), parts.BALLS, parts.GAINED),
-    "ahead": ("extrapolation of the sweeps", switch("extrapolation"), parts.DENSE, parts.GAINED),
-    "kept": ("broad phase kept for many steps", _kept, parts.CROWD, parts.TIME),
-    "deep": ("shorter steps while overlaps last", _deep, parts.INSIDE, parts.RISE),
-    "thin": ("shorter steps for thin bodies", _thin, parts.THIN, parts.APPROACH),
-    "repeats": ("frames repeated in shorter steps", _repeats, parts.PULLED, parts.FLATTENED),
-    "within": ("looks within frames with flat tets", _within, parts.CRUSHED, parts.GAINED),
-    "steady": ("steps that hardly grow again", _steady, parts.VIBRATING, parts.DRIFT),
+    "edges": ("contacts of edges", switch("edges"), parts.CORNERS),
+    "layers": ("depth behind the border", switch("layers"), parts.DEEP),
+    "search": ("search for the surface", switch("search"), parts.OVERLAPPING),
+    "bound": ("bound of a move in the search", number(search, "SEARCH_BOUND", INF), parts.DEEP),
+    "closure": ("closure", switch("closure"), parts.CORNERS),
+    "look": ("second look, after the closure", switch("second look"), parts.FINE),
+    "closure torque": ("torque of the closure", switch("closure torque"), parts.TURNED),
+    "strays": ("vertices that left their triangles", switch("strays"), parts.FINE),
+    "entry": ("back by the side it came in by", kernel(vertex_contact, "ASTRAY", 0.0), parts.RIM),
+    "deep end": ("edges led out by their deep end", _deep_end, parts.ASIDE),
+    "wide": ("no friction across wide gaps", kernel(constraint, "WIDE", INF), parts.ROUGH_RIM),
+    "torque": ("torque of friction across a gap", kernel(constraint, "TURN", -1.0), parts.OBLIQUE),
+    "counted": ("weight of that torque in the sweeps", _counted, parts.CORNER),
+    "ramp": ("ramps of facets", kernel(tangent, "UPRIGHT", 2.0, constraint), parts.BENT),
+    "planes": ("planes that the closure leaves out", switch("old planes"), parts.SEAM),
+    "warm": ("warm start", switch("warm start"), parts.SHEET),
+    "hold": ("persistent edges", switch("persistent edges"), parts.BALLS),
+    "ahead": ("extrapolation of the sweeps", switch("extrapolation"), parts.DENSE),
+    "kept": ("broad phase kept for many steps", switch("broad phase kept"), parts.CROWD),
+    "deep": ("shorter steps while overlaps last", _deep, parts.THICK_PLATE),
+    "thin": ("shorter steps for thin bodies", number(step_bounds, "REACH", INF), parts.THIN),
+    "repeats": ("frames repeated in shorter steps", _repeats, parts.PULLED),
+    "within": ("looks within frames with flat tets", number(stepper, "PART", 10**9), parts.CRUSHED),
+    "steady": ("steps that hardly grow again", number(step_bounds, "KEEP", 0.0), parts.VIBRATING),
 }
 PARTS = {key: Part(*row) for key, row in _rows.items()}
 
@@ -135,7 +123,7 @@ class Line(NamedTuple):
         """Without over with; a run that ends early or is not finite is infinitely worse."""
         if not math.isfinite(self.off):
             return math.inf
-        least = self.part.figure.least
+        least = self.part.case.figure.least
         return max(self.off, least) / max(self.kept, least)
 
     @property
@@ -146,7 +134,7 @@ class Line(NamedTuple):
     def __str__(self):
         """Its columns."""
         numbers = (f"{x:.3g}" for x in (self.kept, self.off, self.ratio))
-        names = self.part.name, self.part.case.title, self.part.figure.name
+        names = self.part.name, self.part.case.title, self.part.case.figure.name
         return TABLE.line(*names, *numbers, "" if self.worth else "WORSENS NOTHING")
 
 
@@ -169,18 +157,18 @@ def main() -> int:
 
 def compare(part: Part) -> Line:
     """Run the case of a part with and without it."""
-    kept = with_every_part(part.case)[part.figure]
+    kept = with_every_part(part.case)
     try:
         with part.off():
-            off = part.case.run()[part.figure]
+            off = part.case.run()
     except SimulationError:
         off = math.inf
     return Line(part, kept, off)
 
 
 @cache
-def with_every_part(case: Case) -> Found:
-    """The figures of a case; several parts may have the same."""
+def with_every_part(case: Case) -> float:
+    """The figure of a case; several parts may have the same."""
     return case.run()
 
 

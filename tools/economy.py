@@ -93,7 +93,7 @@ def sleep_figures(device: str | None) -> dict[str, float]:
     while awake.frame < asleep.frame:
         awake.step_frame()
     times = settling, frame_times(awake, SAMPLE), frame_times(asleep, SAMPLE)
-    settling, resting, sleeping = 1e3 * np.median(times, axis=1)
+    settling, resting, sleeping = (1e3 * float(np.median(t)) for t in times)
     apart = np.abs(awake.positions() - asleep.positions()).max() / awake.model.body_edge.numpy()[0]
     return {
         "settling ms": settling,

@@ -14,7 +14,7 @@ from verification.setup import Ask, on_face
 
 import warp_contact as wc
 from trials import figures, limits, loads, sweeps
-from trials.setting import NONE, body, scene, soft
+from trials.setting import NONE, Setting, body, scene, soft
 from trials.watch import attempt
 from warp_contact.kernels.impulse import impulse as impulse_kernels
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
@@ -28,14 +28,12 @@ class Quantity(NamedTuple):
     least: float  # what it is known to, from rounding or from chance
 
 
-Found = dict[Quantity, float]
-
-
 class Case(NamedTuple):
-    """What is run."""
+    """What is run, and what is measured in it."""
 
     title: str
-    run: Callable[[], Found]
+    figure: Quantity
+    run: Callable[[], float]
 
 
 GAIN = 1e-3  # of the energy: what a pile of roundings and closures may add
@@ -55,20 +53,18 @@ TIME = Quantity("processor time of 20 frames [s]", 0.0)
 TIMES = 3  # runs for a time
 
 
-def collide(build: Callable[..., wc.Scene], *arguments, steps: int = 0, **named) -> Found:
+def collide(figure: Quantity, scene: wc.Scene, steps: int = 0) -> float:
     """A collision of two blocks."""
-    found = collision.collide(build(*arguments, **named), steps=steps)
-    _, spin, _, overlap = found.values()
-    return {OVERLAP: overlap, SPIN: spin}
+    _, spin, _, overlap = collision.collide(scene, steps=steps).values()
+    return spin if figure is SPIN else overlap
 
 
-def gained(build: Callable, *arguments, figure: Quantity = GAINED, most_steps=10**9) -> Found:
+def gained(build: Callable[..., Setting], *arguments, most_steps: int = 10**9) -> float:
     """Energy of a case of ``tools/stability.py``."""
-    record = attempt(partial(build, *arguments), most_steps=most_steps)
-    return {figure: max(record.gained, 0.0)}
+    return max(attempt(partial(build, *arguments), most_steps=most_steps).gained, 0.0)
 
 
-def corner() -> Found:
+def corner() -> float:
     """A step of a heavy cube on a light one."""
     light, heavy = soft(1e5, 1.0, 0.3), soft(1e5, 1e6, 0.3)
     low = body(wc.box(1.0, 1), light, fixed=np.arange(8) != 5)
@@ -77,10 +73,10 @@ def corner() -> Found:
     before = sim.measure().kinetic
     sim.step_frame()
     after = sim.measure()
-    return {GAINED: max((after.kinetic + after.elastic) / before - 1.0, 0.0)}
+    return max((after.kinetic + after.elastic) / before - 1.0, 0.0)
 
 
-def thin() -> Found:
+def thin() -> float:
     """How fast plates still approach each other that ought to part."""
     speed, plates = 20.0, []
     for k in range(2):
@@ -91,36 +87,36 @@ def thin() -> Found:
     for _ in sim.frames(2):
         pass
     lower, upper = (float(sim.velocities(k)[:, 2].mean()) for k in range(2))
-    return {APPROACH: max(lower - upper, 0.0) / speed}
+    return max(lower - upper, 0.0) / speed
 
 
-def overlapping() -> Found:
+def overlapping() -> float:
     """Where the surface is that stage 4 finds."""
     rows = surface.place("", "balanced", wc.Corotated, 0.0, (3, 4), 10.0)
     figure = "surface of the lower block [% of overlap]"
-    return {PLACE: abs(next(row.value for row in rows if row.name == figure))}
+    return abs(next(row.value for row in rows if row.name == figure))
 
 
-def deep() -> Found:
+def deep() -> float:
     """The largest energy; there is none at the start."""
     rubber = wc.NeoHookean(5e4, 0.3, 1000.0, 1e-3)
     places = (0.0, 0.0, 0.0), (0.013, 0.007, 0.04)
     two = scene(*(body(wc.box(0.1, 4), rubber, at) for at in places), gravity=NONE)
     sim = wc.Simulation(two)
-    return {INSERTED: max(sim.measure().energy for _ in sim.frames(20))}
+    return max(sim.measure().energy for _ in sim.frames(20))
 
 
-def crushed() -> Found:
+def crushed() -> float:
     """The largest energy over that at the start."""
     setting = loads.heavy(0.1, 5.0)
     sim = wc.Simulation(setting.scene, fps=setting.fps)
     start = sim.measure().energy
     frames = round(setting.seconds * setting.fps)
     most = max(sim.measure().energy for _ in sim.frames(frames))
-    return {GAINED: max(most / start - 1.0, 0.0)}
+    return max(most / start - 1.0, 0.0)
 
 
-def sheet() -> Found:
+def sheet() -> float:
     """Sweeps and steps are counted as they run."""
     sweeps, steps, flag = (wp.zeros(1, dtype=int) for _ in range(3))
 
@@ -137,20 +133,20 @@ def sheet() -> Found:
         mock.patch.object(impulse, "record", counting(impulse.record, steps)),
     ):
         list(weight.on_sheet("", Ask()))
-    return {SWEEPS: float(sweeps.numpy()[0] / steps.numpy()[0])}
+    return float(sweeps.numpy()[0] / steps.numpy()[0])
 
 
-def vibrating() -> Found:
+def vibrating() -> float:
     """The mean energy of the last ten frames over that of the first ten."""
     block = scene(body(wc.box(0.1, 3), soft(5e4, poisson=0.3)), gravity=NONE)
     sim = wc.Simulation(block)
     sim.state.x.assign(sim.positions() * np.float32([1.0, 1.0, 0.6]))
     energy = [sim.measure().energy for _ in sim.frames(60)]
     first, last = np.mean(energy[:10]), np.mean(energy[-10:])
-    return {DRIFT: abs(float(last / first) - 1.0)}
+    return abs(float(last / first) - 1.0)
 
 
-def pulled() -> Found:
+def pulled() -> float:
     """How flat a tet gets."""
     mesh = wc.box(0.1, 3)
     top, bottom = (on_face(mesh, 2, side) for side in (1, -1))
@@ -158,10 +154,10 @@ def pulled() -> Found:
     block = body(mesh, wc.SpringNetwork(1.0, 1.0, 1.0, 1000.0), v=v, fixed=top | bottom)
     sim = wc.Simulation(scene(block, gravity=NONE), fps=10)
     least = min(sim.measure().volume_ratio for _ in sim.frames(2))
-    return {FLATTENED: 1.0 / least if least > 0.0 else math.inf}
+    return 1.0 / least if least > 0.0 else math.inf
 
 
-def crowd() -> Found:
+def crowd() -> float:
     """The best time of some runs."""
     times, mesh = [], wc.sphere(0.05, 80)
     places = 0.1005 * np.stack(np.unravel_index(np.arange(27), (3, 3, 3)), axis=1)
@@ -173,37 +169,50 @@ def crowd() -> Found:
         for _ in sim.frames(20):
             pass
         times.append(process_time() - begin)
-    return {TIME: min(times)}
+    return min(times)
 
 
-def tilted(title: str, cells: int, place: str = "tilted", **turned) -> Case:
+def thrown(figure: Quantity) -> float:
+    """Blocks that meet obliquely."""
+    return collide(figure, collision.thrown((3, 5), "oblique", 1.0), collision.STEPS)
+
+
+def tilted(figure: Quantity, cells: int, place: str = "tilted", **turned) -> float:
     """A collision of equal blocks, the upper one tilted."""
-    return Case(title, partial(collide, collision.build, cells, cells, 1.0, place, **turned))
+    return collide(figure, collision.build(cells, cells, 1.0, place, **turned))
 
 
-# Of two hundred random draws of 3:3 and 2:5 cells, one of six that need what this is to show.
-_rim = {"angles": (161.0, 219.0, 204.0), "shift": np.array([0.015, 0.019, 0.0])}
-_thrown = partial(collide, collision.thrown, (3, 5), "oblique", 1.0, steps=collision.STEPS)
-_inserted = partial(gained, sweeps.SWEEPS["depth"].build, 0.3, 0.4, figure=RISE, most_steps=1500)
+def rim(figure: Quantity, friction: float) -> float:
+    """Of 200 random draws of 3:3 and 2:5 cells, one of six that need what this is to show."""
+    angles, shift = (161.0, 219.0, 204.0), np.array([0.015, 0.019, 0.0])
+    return tilted(figure, 3, "tilted shifted", friction=friction, angles=angles, shift=shift)
 
-CORNERS = tilted("Collision of tilted blocks", 3)
-FINE = tilted("Collision of tilted blocks of 8 cells", 8)
-ASIDE = tilted("Tilted blocks of 8 cells, one aside", 8, "tilted shifted")
-RIM = tilted("Corner that comes in close to a rim", 3, "tilted shifted", **_rim)
-ROUGH = f"{RIM.title}, with friction"
-ROUGH_RIM = tilted(ROUGH, 3, "tilted shifted", friction=0.3, **_rim)
-OBLIQUE = Case("Oblique collision with friction", _thrown)
-BALLS = Case("Balls of 147 vertices, one falls on the other", partial(gained, limits.balls, 147))
-BENT = Case("Corner that slides up a bent face", partial(gained, figures.collide, 47))
-SEAM = Case("Corner on the seam of two cubes with a gap", partial(gained, limits.seam, 1e-3))
-CORNER = Case("Heavy corners over fixed ones of a light face with a free one, one step", corner)
-THIN = Case("Thin soft plates at 20 m/s", thin)
-OVERLAPPING = Case("Stage 4, overlap of 10 %, 1:10", overlapping)
-DEEP = Case("Blocks that start 60 % inside", deep)
-INSIDE = Case("A block that starts 0.3 edges inside one 0.4 edges thick", _inserted)
-DENSE = Case("Cube on a cube of a 10000th of its density", partial(gained, loads.column, 1e4, 1.0))
-CRUSHED = Case("Cube struck by one of 10^4 times its mass", crushed)
-SHEET = Case("A7 block on a membrane", sheet)
-VIBRATING = Case("Free block, let go squeezed", vibrating)
-PULLED = Case("Springs pulled to five lengths", pulled)
-CROWD = Case("27 spheres that almost touch", crowd)
+
+def case(title: str, figure: Quantity, run: Callable[..., float], *arguments, **named) -> Case:
+    """The case whose figure is ``run(*arguments, **named)``."""
+    return Case(title, figure, partial(run, *arguments, **named))
+
+
+STRUCK = "Heavy corners over fixed ones of a light face with a free one, one step"
+THICK = "A block that starts 0.3 edges inside one 0.4 edges thick"
+CORNERS = case("Collision of tilted blocks", OVERLAP, tilted, OVERLAP, 3)
+TURNED = case("Collision of tilted blocks", SPIN, tilted, SPIN, 3)
+FINE = case("Collision of tilted blocks of 8 cells", OVERLAP, tilted, OVERLAP, 8)
+ASIDE = case("Tilted blocks of 8 cells, one aside", OVERLAP, tilted, OVERLAP, 8, "tilted shifted")
+RIM = case("Corner that comes in close to a rim", OVERLAP, rim, OVERLAP, 0.0)
+ROUGH_RIM = case("Corner that comes in close to a rim, with friction", SPIN, rim, SPIN, 0.3)
+OBLIQUE = case("Oblique collision with friction", SPIN, thrown, SPIN)
+BALLS = case("Balls of 147 vertices, one falls on the other", GAINED, gained, limits.balls, 147)
+BENT = case("Corner that slides up a bent face", GAINED, gained, figures.collide, 47)
+SEAM = case("Corner on the seam of two cubes with a gap", GAINED, gained, limits.seam, 1e-3)
+DENSE = case("Cube on a cube of a 10000th of its density", GAINED, gained, loads.column, 1e4, 1.0)
+THICK_PLATE = case(THICK, RISE, gained, sweeps.SWEEPS["depth"].build, 0.3, 0.4, most_steps=1500)
+CORNER = Case(STRUCK, GAINED, corner)
+THIN = Case("Thin soft plates at 20 m/s", APPROACH, thin)
+OVERLAPPING = Case("Stage 4, overlap of 10 %, 1:10", PLACE, overlapping)
+DEEP = Case("Blocks that start 60 % inside", INSERTED, deep)
+CRUSHED = Case("Cube struck by one of 10^4 times its mass", GAINED, crushed)
+SHEET = Case("A7 block on a membrane", SWEEPS, sheet)
+VIBRATING = Case("Free block, let go squeezed", DRIFT, vibrating)
+PULLED = Case("Springs pulled to five lengths", FLATTENED, pulled)
+CROWD = Case("27 spheres that almost touch", TIME, crowd)

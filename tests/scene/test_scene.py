@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warp_contact import ContactSurface, NeoHookean, Penalty, Scene, box
+from warp_contact import ContactSurface, NeoHookean, Penalty, Scene, Simulation, box
 from warp_contact.scene.scene import rotation_matrix
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)

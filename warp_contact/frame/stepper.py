@@ -13,6 +13,7 @@ from warp_contact.data.work import Work, allocate_work
 from warp_contact.errors import SimulationError
 from warp_contact.frame import checkpoint
 from warp_contact.frame.capacity import enlarged
+from warp_contact.frame.damping import share_for, stages_for
 from warp_contact.frame.diagnosis import lost_vertex
 from warp_contact.frame.frame_start import FrameStart
 from warp_contact.frame.overlap import overlaps
@@ -28,7 +29,6 @@ from warp_contact.frame.step_bounds import (
     stays_stable,
 )
 from warp_contact.frame.step_count import StepCount
-from warp_contact.step.forces import share_for, stages_for
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.motion import kick
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
@@ -113,9 +113,9 @@ class Stepper:
 
     def _all_sleep(self) -> bool:
         """Decide which bodies sleep; where all do, nothing moves in this frame."""
-        if (
-            not self.sleeping or self.overlapping is not False
-        ):  # an overlap that is left has to be searched
+        if not self.sleeping:
+            return False
+        if self.overlapping is not False:  # an overlap that is left has to be searched
             return False
         if self.sleeping.update(self._state, self.work):
             return False

@@ -99,7 +99,6 @@ class Scene:
         Raises:
             ValueError: naming the body, for input that cannot be simulated
         """
-        self._refuse_if_frozen("a body")
         label = self._new_label(label)
         try:
             if not isinstance(mesh, TetMesh):
@@ -121,6 +120,7 @@ class Scene:
 
     def _new_label(self, label: str | None) -> str:
         """A label that no body has; raises ValueError for one that is taken or that of a plane."""
+        self._refuse_if_frozen("a body")
         label = f"body{len(self.bodies)}" if label is None else str(label)
         if label in self._labels:
             raise ValueError(f"body '{label}': another body has this label")

@@ -69,9 +69,10 @@ def damp(
     """Damp ``v`` [m/s] over ``dt`` [s], shape (1,), at fixed positions ``x`` [m].
 
     Solves M dv/dt = -C(x) v in ``stages`` stages of ``motion.relax``, whose result counts by
-    ``share`` [-], shape (1,): no mode grows for dt lambda_max(M^-1 C) up to that of
-    ``frame/damping.py``. Momentum is kept, vertices with ``inv_mass`` [1/kg] 0 keep their velocity. Scratch:
-    ``f_tet`` (4 n_tet,) and two arrays (n_vert,). Without a damped body nothing is launched.
+    ``share`` [-], shape (1,). No mode grows for dt lambda_max(M^-1 C) up to ``reach`` of
+    frame/damping.py. Momentum is kept, and vertices with ``inv_mass`` [1/kg] 0 keep their velocity.
+    Scratch: ``f_tet`` (4 n_tet,) and two arrays (n_vert,). Nothing is launched without a damped
+    body.
     """
     if stages == 0 or not any(e.damped for e in model.elements):
         return

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 import warp as wp
 
+from warp_contact import Scene, Simulation
+from warp_contact import box as block
 from warp_contact.frame import spectrum as spectrum_file
 from warp_contact.frame.spectrum import Spectrum
 from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork
@@ -225,7 +227,7 @@ def test_small_and_stiff_bodies_have_the_frequencies_of_large_ones(size):
     scenes = []
     for edge in (1.0, size):
         scene = Scene(gravity=(0.0, 0.0, 0.0))
-        scene.add_body(box(edge, 2), NeoHookean(2e11, 0.3, 7800.0))
+        scene.add_body(block(edge, 2), NeoHookean(2e11, 0.3, 7800.0))
         scenes.append(Simulation(scene, fps=5e3 / edge))
     whole, small = (sim._stepper.spectrum.omega(sim.state.x) for sim in scenes)
     assert small * size == pytest.approx(whole, rel=1e-3)  # what the bound is known to

@@ -130,7 +130,7 @@ def sheet() -> float:
     with (
         mock.patch.multiple(weight, SETTLE=0.3, SAMPLE=0.1),
         mock.patch.object(impulse, "_sweep", counting(impulse._sweep, sweeps)),
-        mock.patch.object(impulse, "record", counting(impulse.record, steps)),
+        mock.patch.object(impulse, "add_forces", counting(impulse.add_forces, steps)),
     ):
         list(weight.on_sheet("", Ask()))
     return float(sweeps.numpy()[0] / steps.numpy()[0])

@@ -22,16 +22,11 @@ from types import ModuleType
 from typing import NamedTuple
 from unittest import mock
 
-<<<<<<< HEAD
 import warp as wp
 from measure.report import Table
 from measure.run import command_line, one_of
 from trials import parts
 from trials.parts import Case
-=======
-from measure.run import command_line, one_of
-from parts.table import PARTS, Part
->>>>>>> main
 
 from warp_contact import SimulationError
 from warp_contact.data.switches import without
@@ -148,11 +143,7 @@ def main() -> int:
     parser = command_line(__doc__)
     parser.add_argument("parts", nargs="*", type=one_of(PARTS), metavar="part", help="or all")
     args = parser.parse_args()
-<<<<<<< HEAD
     print(TABLE.line(*WIDTHS, ""))
-=======
-    print("  ".join(c.ljust(w) for c, w in zip(COLUMNS, WIDTHS, strict=True)).rstrip())
->>>>>>> main
     useless = []
     for key in args.parts or PARTS:
         line = compare(PARTS[key])

@@ -19,15 +19,14 @@ def run(cases: Mapping[str, Case]) -> dict[str, list[Figure]]:
     """
     found = {}
     for name, case in cases.items():
-        found[name] = kept = []
-        for figure in guarded(name, case):
-            kept.append(figure)
+        found[name] = []
+        for figure in _guarded(name, case):
+            found[name].append(figure)
             print(report.line(figure), flush=True)
     return found
 
 
-def guarded(name: str, case: Case) -> Figures:
-    """The figures of a case, the last of them the error that ended it, if any."""
+def _guarded(name: str, case: Case) -> Figures:
     try:
         yield from case()
     except SimulationError as error:

@@ -56,7 +56,7 @@ def test_rest_converges_with_the_first_order_of_the_step(ask, hold):
 
 
 def test_an_error_that_does_not_fall_has_no_order():
-    found = orders.order("", "", np.array([1.0, 0.5, 0.25]), [1.0, 0.2, 0.3], orders.SMOOTH)
+    found = orders.order("", "", (1, 2, 4), [1.0, 0.2, 0.3], orders.SMOOTH)
     assert found.level == "missed"
-    exact = orders.order("", "", np.array([1.0, 0.5, 0.25]), [1.0, 0.5, 0.25], orders.SMOOTH)
+    exact = orders.order("", "", (1, 2, 4), [1.0, 0.5, 0.25], orders.SMOOTH)
     assert exact.value == pytest.approx(1.0) and exact.level == "best"

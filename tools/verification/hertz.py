@@ -63,9 +63,9 @@ def line_contact(load: float, radius: float, e_star: float) -> tuple[float, floa
     return float(b), float(np.sqrt(load * e_star / (np.pi * radius)))
 
 
-CONTACT = contact_radius(LOADS[1], RADIUS, modulus(YOUNG))  # a that the meshes are made for [m]
-Pressed = tuple[wc.Simulation, np.ndarray]  # at rest, mean pressures of the vertices [Pa]
 E_STAR, ORIGIN = modulus(YOUNG), (0.0, 0.0, 0.0)  # [Pa], [m]
+CONTACT = contact_radius(LOADS[1], RADIUS, E_STAR)  # a that the meshes are made for [m]
+Pressed = tuple[wc.Simulation, np.ndarray]  # at rest, mean pressures of the vertices [Pa]
 
 
 def run(ask: Ask) -> Figures:
@@ -154,27 +154,23 @@ def below(label: str, pressed: Pressed, radius: float, e_star: float, n: int, po
     under = np.flatnonzero(on_ball(sim.scene.bodies[0]))
     r = np.linalg.norm(pose.back(sim.positions(0)[under])[:, :2], axis=1)
     p, area = p[under], vertex_area(sim.model, sim.state.x)[under]
-    a = contact_radius(float(p @ area), radius, e_star)
-    p0 = 1.5 * float(p @ area) / (np.pi * a**2) if a else 0.0
-    return profile(label, ("force [N]", "radius"), (r, p, area), (a, p0), 2.5, n)
-
-
-def profile(label: str, names: tuple, found: tuple, exact: tuple, moment: float, n: int) -> Figures:
-    """Pressures against p0 sqrt(1 - r^2 / a^2) at the same force, with n elements across a.
-
-    ``names`` are those of the force and of a. What was found are places r [m], pressures there [Pa]
-    and how much of the surface each is for; exact are a [m] and p0 [Pa], and ``moment`` is a^2 over
-    the second moment of p.
-    """
-    (r, p, area), (a, p0) = found, exact
     force = float(p @ area)
-    yield Figure(label, names[0], force, limits=() if force > 0.0 else RADIUS_LIMITS)
-    if force <= 0.0:
-        return
-    radius = np.sqrt(moment * (p * area) @ r**2 / force)
-    yield relative(label, f"{names[1]} from the second moment [m]", radius, a, RADIUS_LIMITS)
-    middle = p[np.abs(r).argmin()]
-    yield relative(label, "pressure at the middle [Pa]", middle, p0, PEAK[n])
+    yield Figure(label, "force [N]", force)
+    a = contact_radius(force, radius, e_star)
+    exact = a, 1.5 * force / (np.pi * a**2)
+    yield from profile(label, "radius", r, p, area, exact, 2.5, n)
+
+
+def profile(label: str, name: str, r, p, area, exact: tuple, moment: float, n: int) -> Figures:
+    """Pressures [Pa] against p0 sqrt(1 - r^2 / a^2), with n elements across a of that name.
+
+    Each is at a place ``r`` [m] for a part ``area`` of the surface; exact are a [m] and p0 [Pa] at
+    the same force, and ``moment`` is a^2 over the second moment of p.
+    """
+    a, p0 = exact
+    second = np.sqrt(moment * (p * area) @ r**2 / float(p @ area))
+    yield relative(label, f"{name} from the second moment [m]", second, a, RADIUS_LIMITS)
+    yield relative(label, "pressure at the middle [Pa]", p[np.abs(r).argmin()], p0, PEAK[n])
     shape = p0 * np.sqrt(np.maximum(1.0 - (r / a) ** 2, 0.0))
     yield zero(label, OVERALL, np.sqrt(area @ (p - shape) ** 2 / (area @ shape**2)), PROFILE[n])
 
@@ -235,6 +231,7 @@ def line_on_plane(ask: Ask, n: int, pose: Pose) -> Figures:
     x = np.where(per_row > 0.0, x, rest)
     width = np.gradient(x)
     pressure = per_row / np.ptp(mesh.vertices[:, 1]) / width
-    exact = line_contact(float(pressure @ width), RADIUS, E_STAR)
-    label, names = f"A3 cylinder on plane, N = {n} {pose.name}", ("force [N/m]", "half-width")
-    return profile(label, names, (x, pressure, width), exact, 4.0, n)
+    label, load = f"A3 cylinder on plane, N = {n} {pose.name}", float(pressure @ width)
+    yield Figure(label, "force [N/m]", load)
+    exact = line_contact(load, RADIUS, E_STAR)
+    yield from profile(label, "half-width", x, pressure, width, exact, 4.0, n)

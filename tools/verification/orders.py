@@ -128,8 +128,8 @@ def resting(ask: Ask) -> Figures:
 def pressure(ask: Ask, counts) -> Figures:
     """L2 error of the pressure below a sphere and a cylinder."""
     for body, case in (("sphere", hertz.on_plane), ("cylinder", hertz.line_on_plane)):
-        found = [{f.name: f.value for f in case(ask, n, ALIGNED)} for n in counts]
-        errors = [figures.get(hertz.OVERALL, np.nan) for figures in found]
+        found = (case(ask, n, ALIGNED) for n in counts)
+        errors = [next(f.value for f in figures if f.name == hertz.OVERALL) for figures in found]
         label = f"A8 {body} on plane, N = {listed(counts)}"
         yield order(label, "order of the pressure, L2", counts, errors, PRESSURE)
 

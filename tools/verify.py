@@ -9,10 +9,10 @@ is 1 when one is missed. No time is measured.
 
 import sys
 from functools import partial
-from importlib import import_module
+from pkgutil import resolve_name
 
 from measure import machine, report
-from measure.figure import Figures, lowest
+from measure.figure import lowest
 from measure.run import command_line, one_of, run, status
 from verification.setup import RESPONSES, Ask
 
@@ -49,15 +49,10 @@ def main() -> int:
     print(report.FIGURES.head())
     ask = Ask(args.quick, args.response, args.seed)
     chosen = [CASES[name] for name in args.cases or CASES]
-    found = run({title: partial(figures, where, ask) for title, where in chosen})
+    cases = {title: resolve_name(f"verification.{where}") for title, where in chosen}
+    found = run({title: partial(case, ask) for title, case in cases.items()})
     print("", *(f"{title}: {lowest(kept)}" for title, kept in found.items()), sep="\n")
     return status(found)
-
-
-def figures(where: str, ask: Ask) -> Figures:
-    """Those of a case; only the files of cases that are asked for are imported."""
-    file, function = where.split(".")
-    return getattr(import_module(f"verification.{file}"), function)(ask)
 
 
 if __name__ == "__main__":

@@ -9,10 +9,8 @@ from measure import report
 from measure.figure import MISSED, Figure, Figures, lowest
 from warp_contact import SimulationError
 
-Case = Callable[[], Iterable[Figure]]
 
-
-def run(cases: Mapping[str, Case]) -> dict[str, list[Figure]]:
+def run(cases: Mapping[str, Callable[[], Iterable[Figure]]]) -> dict[str, list[Figure]]:
     """The figures of every case by its name, each printed as it comes.
 
     A case that ends with a ``SimulationError`` keeps the figures that it has and misses.
@@ -26,7 +24,7 @@ def run(cases: Mapping[str, Case]) -> dict[str, list[Figure]]:
     return found
 
 
-def _guarded(name: str, case: Case) -> Figures:
+def _guarded(name: str, case: Callable) -> Figures:
     try:
         yield from case()
     except SimulationError as error:

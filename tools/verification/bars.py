@@ -132,18 +132,12 @@ def build(impact: Impact, n: int, across: tuple[int, int]) -> tuple[wc.Scene, fl
     return scene, width
 
 
-class History(NamedTuple):
-    """What an impact showed in each frame; time 0 is the moment at which the rest shapes touch."""
+def record(impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)) -> tuple:
+    """Run an impact: what it shows in each frame, and the coefficient of restitution.
 
-    pressure: np.ndarray  # mean of the frame [Pa]
-    energy: np.ndarray  # at its end, of that at the start
-    steps: np.ndarray
-    time: np.ndarray  # its end [s]
-    e: float  # coefficient of restitution
-
-
-def record(impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)) -> History:
-    """Run an impact."""
+    In each frame the mean pressure [Pa], the energy at the end, of that at the start, the number of
+    steps, and the time at the end [s], 0 when the rest shapes touch.
+    """
     scene, width = build(impact, n, across)
     # A contact as stiff as an element of the bar, five times: a penalty that is not seen.
     respond = ask.respond(5.0 * impact.bars[0].young * width / across[0])
@@ -160,7 +154,7 @@ def record(impact: Impact, ask: Ask, n: int, across: tuple[int, int] = (1, 1)) -
     found = watch(sim, int(np.ceil(last / impact.frame)) * impact.frame, look).T
     body, mass = sim.model.vert_body.numpy(), masses(sim)
     speeds = np.bincount(body, mass * sim.velocities()[:, 2]) / np.bincount(body, mass)
-    return History(*found, float(abs(speeds[-1] - sum(speeds[:-1])) / impact.approach))
+    return *found, float(abs(speeds[-1] - sum(speeds[:-1])) / impact.approach)
 
 
 def release(time: np.ndarray, pressure: np.ndarray, impact: Impact) -> float:
@@ -169,39 +163,35 @@ def release(time: np.ndarray, pressure: np.ndarray, impact: Impact) -> float:
     A frame that holds the end carries a part of that pressure, by which it is shortened.
     """
     last = impact.left * impact.pressure
-    on = np.flatnonzero(pressure > 0.1 * last)
-    if len(on) == 0:
-        return float("nan")
-    part = min(pressure[on[-1]] / last, 1.0)
-    return float(time[on[-1]] - (1.0 - part) * impact.frame)
+    end = np.flatnonzero(pressure > 0.1 * last)[-1]
+    return float(time[end] - (1.0 - min(pressure[end] / last, 1.0)) * impact.frame)
 
 
 def hit(label: str, ask: Ask, impact: Impact, n: int, across=(1, 1)) -> Figures:
     """Restitution, pressure, release and energies of an impact."""
-    found = record(impact, ask, n, across)
-    time, round_trip = found.time, impact.bars[0].round_trip
-    yield relative(label, "restitution", found.e, impact.e, RESTITUTION)
-    inner = (time > 0.15 * impact.plateau) & (time < 0.85 * impact.plateau)
-    p = found.pressure[inner] / impact.pressure
+    pressure, energy, steps, time, e = record(impact, ask, n, across)
+    round_trip, plateau = impact.bars[0].round_trip, impact.plateau
+    yield relative(label, "restitution", e, impact.e, RESTITUTION)
+    p = pressure[(time > 0.15 * plateau) & (time < 0.85 * plateau)] / impact.pressure
     yield zero(label, "pressure, rms error of the middle 70 %", rms(p - 1.0), PLATEAU)
     yield relative(label, "pressure, mean of the middle 70 %", p.mean(), 1.0, PLATEAU)
-    off = release(time, found.pressure, impact)
+    off = release(time, pressure, impact)
     error = (off - impact.contact) / round_trip
     yield Figure(label, "end of the contact [s]", off, impact.contact, error, RELEASE)
     if impact.e < 1.0:
         scene, width = build(impact, n, across)
-        impulse = collide(scene, impact.frame, found.steps.astype(int))
+        impulse = collide(scene, impact.frame, steps.astype(int))
         there = release(time, impulse / (impact.frame * width**2), impact)
         error = (there - impact.contact) / round_trip
         name = "end, exact contact on the same mesh [s]"
         yield Figure(label, name, there, impact.contact, error)
         apart = 100.0 * (off - there) / round_trip
         yield Figure(label, "end, difference of both [% of 2 L / c]", apart)
-    after = found.pressure[time > impact.contact + 0.1 * round_trip].max() / impact.pressure
+    after = pressure[time > impact.contact + 0.1 * round_trip].max() / impact.pressure
     yield zero(label, "largest pressure afterwards [of the plateau]", after, SUCTION)
-    left, name = found.energy[-1], "energy at the end [of that at the start]"
+    left, name = energy[-1], "energy at the end [of that at the start]"
     yield Figure(label, name, left, 1.0, 1.0 - left, LOSS)
-    rise = max(found.energy.max() - 1.0, 0.0)
+    rise = max(energy.max() - 1.0, 0.0)
     yield zero(label, "rise of the energy [of that at the start]", rise, GAIN)
 
 

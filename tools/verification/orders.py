@@ -69,9 +69,10 @@ def listed(counts) -> str:
 def impact(ask: Ask, counts) -> Figures:
     """Restitution and energy of a bar on a wall; the step follows the elements."""
     found = [bars.record(bars.IMPACTS["on a wall"], ask, n) for n in counts]
+    _, energy, _, _, e = zip(*found, strict=True)
     label = f"A8 bar on a wall, N = {listed(counts)}"
-    yield order(label, "order of 1 - e", counts, [1.0 - h.e for h in found], IMPACT)
-    lost = [1.0 - h.energy[-1] for h in found]
+    yield order(label, "order of 1 - e", counts, 1.0 - np.array(e), IMPACT)
+    lost = [1.0 - left[-1] for left in energy]
     yield order(label, "order of the energy lost", counts, lost, IMPACT)
 
 

@@ -1,6 +1,5 @@
 """A4: impacts of elastic bars, and their orders of convergence."""
 
-import numpy as np
 import pytest
 from verification import bars, orders
 

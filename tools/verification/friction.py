@@ -64,18 +64,15 @@ def build(tan: float, mu: float, velocity=(0.0, 0.0, 0.0), size=EDGE) -> wc.Scen
     return scene
 
 
-def begin(ask: Ask, scene: wc.Scene) -> wc.Simulation:
+def begin(ask: Ask, tan: float, mu: float, velocity=(0.0, 0.0, 0.0), size=EDGE) -> wc.Simulation:
     """A simulation that starts at rest against the plane, with its velocity.
 
     A deformable block that is let go starts to swing, which leaves it with a speed of its own. So
     it comes to rest first, held by a friction that no slope here overcomes.
     """
-    mu, scene.friction = scene.friction, HOLD
-    at_rest = wc.Simulation(scene, ask.respond(*PENALTY), fps=FPS)
-    at_rest.set_velocity(0, (0.0, 0.0, 0.0))
+    at_rest = wc.Simulation(build(tan, HOLD, size=size), ask.respond(*PENALTY), fps=FPS)
     watch(at_rest, QUIET)
-    scene.friction = mu
-    sim = wc.Simulation(scene, ask.respond(*PENALTY), fps=FPS)
+    sim = wc.Simulation(build(tan, mu, velocity, size), ask.respond(*PENALTY), fps=FPS)
     sim.state.x.assign(at_rest.positions())
     return sim
 
@@ -93,7 +90,7 @@ def slope(ask: Ask, tan: float, mu: float) -> Figures:
     deformable block leaves it with a speed that nothing takes away.
     """
     label = f"A5 slope {tan:.3g}, mu {mu:g}"
-    sim = begin(ask, build(tan, mu))
+    sim = begin(ask, tan, mu)
     start = centre(sim)[0, 0]
     watch(sim, QUIET)
     first = sim.positions().astype(float)
@@ -123,7 +120,7 @@ def stop(ask: Ask, speed: float, mu: float, degrees: float) -> Figures:
     """Way, time and direction of a block that slides to a stop."""
     label = f"A5 flat, {speed:g} m/s, mu {mu:g}, {degrees:g} deg"
     way = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0])
-    sim = begin(ask, build(0.0, mu, speed * way))
+    sim = begin(ask, 0.0, mu, speed * way)
     start = centre(sim)[0]
     exact = speed / (mu * G)
     lasts = np.ceil((1.1 * exact + 0.1) * FPS) / FPS
@@ -148,7 +145,7 @@ def stop(ask: Ask, speed: float, mu: float, degrees: float) -> Figures:
 def tip(ask: Ask, ratio: float) -> Figures:
     """Whether a slender block of w/h ``ratio`` falls over on the slope."""
     label = f"A5 slope {SLOPE:g}, block of w/h {ratio:g}"
-    sim = begin(ask, build(SLOPE, HOLD, size=(ratio * EDGE, ratio * EDGE, EDGE)))
+    sim = begin(ask, SLOPE, HOLD, size=(ratio * EDGE, ratio * EDGE, EDGE))
     top = sim.positions()[:, 2] > 0.9 * EDGE
     for _ in sim.frames(round(LASTS * FPS)):
         axis = sim.positions()[top].mean(axis=0) - sim.positions().mean(axis=0)

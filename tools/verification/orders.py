@@ -96,8 +96,8 @@ def in_steps(what: tuple[str, str], of, start: tuple, x: np.ndarray, seconds: fl
 def sliding(ask: Ask) -> Figures:
     """Place of a block on a slope, in motion from the start: letting go is not smooth."""
     scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
-    x = friction.begin(ask, scene).positions()
     start = scene, ask.respond(*friction.PENALTY), FPS
+    x = friction.begin(ask, friction.SLOPE, MU).positions()
     what = "sliding block", "place"
     yield in_steps(what, lambda sim: friction.centre(sim)[0, :1], start, x, SLIDES)
 

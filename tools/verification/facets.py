@@ -147,12 +147,8 @@ def level(
     if c >= n_contact[0] or contact[c].pair[1] >= n_body or contact[c].coef[0] == 0.0:
         return
     coef = contact[c].coef  # of the triangle's corners from 2 on
-    most = int(2)
-    for k in range(3, 5):
-        if coef[k] < coef[most]:
-            most = k
+    most = wp.where(coef[3] < coef[2], 3, 2)
+    most = wp.where(coef[4] < coef[most], 4, most)
     for k in range(2, 5):
-        coef[k] = -1.0 / 3.0
-        if closest:
-            coef[k] = wp.where(k == most, -1.0, 0.0)
+        coef[k] = wp.where(closest, wp.where(k == most, -1.0, 0.0), -1.0 / 3.0)
     contact[c].coef = coef

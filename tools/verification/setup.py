@@ -108,9 +108,8 @@ def forces(sim: wc.Simulation, *pairs: tuple[str, str]) -> list[float]:
 
 def masses(sim: wc.Simulation, body: int | None = None) -> np.ndarray:
     """Of the vertices of one body or of all [kg], in double precision."""
-    ends = sim.model.body_vert.numpy()
-    part = slice(None) if body is None else slice(*ends[body : body + 2])
-    return sim.model.mass.numpy()[part].astype(float)
+    mass = sim.model.mass.numpy().astype(float)
+    return mass if body is None else mass[sim.model.vert_body.numpy() == body]
 
 
 def facing(x: np.ndarray, tris: np.ndarray, up: float, least: float = 0.9) -> np.ndarray:

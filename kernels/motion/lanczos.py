@@ -67,7 +67,7 @@ def multiply(
 
 @wp.func
 def mass_norm2(m: float, y: wp.vec3) -> wp.float64:
-    """m y . y, in double precision where it is too large for a float32: small, stiff bodies."""
+    """M y . y, in double precision where it is too large for a float32: small, stiff bodies."""
     p = m * wp.dot(y, y)
     if wp.isfinite(p):
         return wp.float64(p)

@@ -66,22 +66,22 @@ class StepCount:
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlapping or self._leaves)
         n = step_bounds.steps_in_frame(per_second, self.fps, last)
         if n > self.most:
-            cause = self._of_stiffness(stiffest, omega)
+            cause = self._of_stiffness(state, stiffest, omega)
             if per_second > step_bounds.PATIENCE * omega:  # the speed asks for them
                 cause = self._of_speed(state, speed)
             few = f"max_substeps={self.most}"
             raise SimulationError(f"frame {frame} needs {n} substeps, more than {few}: {cause}")
         return n
 
-    def _of_stiffness(self, body: int, omega: float) -> str:
+    def _of_stiffness(self, state: State, body: int, omega: float) -> str:
         """Why a step is short, and what to do, where vibrations limit it."""
         if isinstance(self._response, Penalty):
             stiffness = self._response.stiffness
             return f"a penalty of {stiffness:g} N/m is too stiff for the lightest vertex"
         name = f"body '{self._model.labels[body]}'"
-        units = "check its density [kg/m^3], modulus [Pa] and size [m]"
-        remedy = "take a softer or coarser body, or raise max_substeps"
-        return f"{name} vibrates at {omega / (2.0 * np.pi):.3g} Hz; {units}, {remedy}"
+        flattest = f"the flattest tet is {flattest_tet(self._model, state.x)}"
+        remedy = "check density [kg/m^3], modulus [Pa], size [m] and tets, or raise max_substeps"
+        return f"{name} vibrates at {omega / (2.0 * np.pi):.3g} Hz ({flattest}); {remedy}"
 
     def _of_speed(self, state: State, speed: float) -> str:
         """The same where motion limits it."""

@@ -14,9 +14,8 @@ import warp_contact.step
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
 from clock.figures import step_figures
-from clock.memory import held
 from clock.scenes import copies, pile
-from clock.timer import ALONE, MEMORY, OTHER, StageTimer
+from clock.timer import ALONE, MEMORY, OTHER, StageTimer, held
 from clock.window import Cost, Timing, measure
 
 

@@ -6,15 +6,15 @@ one element, both just before it: what remains is the work itself, without Pytho
 clock is that of the thread, which stands still while others have the core.
 """
 
+from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import fields, is_dataclass
 from time import perf_counter, thread_time
 from traceback import walk_stack
 from typing import NamedTuple
 from unittest import mock
 
 import warp as wp
-
-from clock.memory import held
 
 ROOM = "warp_contact.step."
 OTHER = "other"  # asked for outside of a step
@@ -104,3 +104,26 @@ def _stage() -> str:
     modules = (frame.f_globals.get("__name__", "") for frame, _ in walk_stack(None))
     stage = next((m.removeprefix(ROOM) for m in modules if m.startswith(ROOM)), OTHER)
     return ALONE if stage == "step" else stage
+
+
+def arrays(holder) -> Iterator[wp.array]:
+    """All arrays in a dataclass, a Warp struct or a tuple of these."""
+    if isinstance(holder, wp.array):
+        yield holder
+    elif is_dataclass(holder):
+        yield from arrays(tuple(getattr(holder, field.name) for field in fields(holder)))
+    elif isinstance(holder, tuple):
+        for item in holder:
+            yield from arrays(item)
+    elif hasattr(holder, "_cls"):  # an instance of a wp.struct
+        yield from arrays(tuple(getattr(holder, name) for name in holder._cls.vars))
+
+
+def held(*holders) -> int:
+    """Bytes of all their arrays; what several of them share counts once."""
+    total, last = 0, 0
+    for a in sorted(arrays(holders), key=lambda a: a.ptr or 0):
+        end = (a.ptr or 0) + a.size * wp.types.type_size_in_bytes(a.dtype)
+        total += max(0, end - max(a.ptr or 0, last))
+        last = max(last, end)
+    return total

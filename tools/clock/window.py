@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import warp as wp
 
-from clock.memory import arrays, held
-from clock.timer import Operation, StageTimer, milliseconds
+from clock.timer import Operation, StageTimer, arrays, held, milliseconds
 from warp_contact import Simulation
 from warp_contact.frame.damping import share_for, stages_for
 from warp_contact.step.loop import step_of

@@ -12,19 +12,18 @@ panels and summary.png with four of them, and pareto.txt. ``--draw`` measures no
 pictures of a table again, beside it.
 """
 
-import statistics
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from statistics import median
 from time import perf_counter
 
 from chart import closed_forms, points, scenes, words
 from chart.panel import Panel
 from chart.points import Point
-from engines import outside, settings
-from engines.runs import Run, runs
+from engines import ours
+from engines.runs import SWEEPS, Run, runs, versions
 from engines.task import Failed, Task
 from measure import machine
 from measure.run import command_line, count, one_of
@@ -39,6 +38,7 @@ TASKS = {
 }
 LIMIT, QUICK_LIMIT = 12.0, 6.0  # wall seconds of one run
 REPEATS = 3  # of everything, in turn; times are medians
+FEW = 5  # settings of each engine outside in the quick run
 
 
 def main() -> int:
@@ -51,22 +51,27 @@ def main() -> int:
     parser.add_argument("--repeats", type=count, help=f"{REPEATS}, quick: 1")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="a table to draw again")
     args = parser.parse_args()
-    chosen = {name: TASKS[name](args.quick) for name in args.tasks or TASKS}
-    titles = {panel.name: panel.title for _, panels in chosen.values() for panel in panels}
+    chosen = [TASKS[name](args.quick) for name in args.tasks or TASKS]
+    titles = {panel.name: panel.title for _, panels in chosen for panel in panels}
     if args.draw:
         draw(args.draw.parent, titles, points.read(args.draw))
         return 0
-    others = {engine: settings.outside(engine, args.quick) for engine in settings.SWEEPS}
+    few = FEW if args.quick else None
+    others = {engine: rows[:few] for engine, (_, rows) in SWEEPS.items()}
     limit = QUICK_LIMIT if args.quick else LIMIT
     begin, rounds = perf_counter(), []
     for _ in range(args.repeats or (1 if args.quick else REPEATS)):
         rounds.append([])
-        for task, panels in chosen.values():
-            for run in runs(task, settings.own(args.quick), others, args.python, limit):
+        for task, panels in chosen:
+            for run in runs(task, ours.settings(args.quick), others, args.python, limit):
                 rounds[-1] += judge(task, panels, run)
         # After every round: a long run leaves what it has.
-        found = choose([median(same) for same in zip(*rounds, strict=True)])
-        save(args.out, head(args.python, len(rounds), perf_counter() - begin), titles, found)
+        found = choose([middle(same) for same in zip(*rounds, strict=True)])
+        args.out.mkdir(parents=True, exist_ok=True)
+        points.write(args.out / "pareto.csv", found)
+        text = words.report(head(args.python, rounds, perf_counter() - begin), titles, found)
+        (args.out / "pareto.txt").write_text(text, encoding="utf-8")
+        print(text)
         draw(args.out, titles, found)
     return 0
 
@@ -75,67 +80,51 @@ def judge(task: Task, panels: list[Panel], run: Run) -> Iterator[Point]:
     """The errors of a run in all panels, printed as they come."""
     method, setting, motion = run
     for panel in panels:
-        point = Point(panel.name, method, setting, motion.wall, None)
+        error, outcome = None, motion.reason or "ok"
         try:
-            if isinstance(motion, Failed):
-                raise motion
-            point = replace(point, startup=motion.startup)
-            point = replace(point, error=panel.error(task, motion))
+            if not motion.reason:
+                error = panel.error(task, motion)
         except Failed as failed:
-            point = replace(point, outcome=str(failed))
-        print(*point.cells(), sep="  ", flush=True)
+            outcome = str(failed)
+        point = Point(panel.name, method, setting, motion.wall, error, outcome, motion.startup)
+        print(*point, sep="  ", flush=True)
         yield point
 
 
-def median(same: tuple[Point, ...]) -> Point:
+def middle(same: tuple[Point, ...]) -> Point:
     """Repeats of a point as one; a run that fails once has failed."""
-    failed = next((p for p in same if p.failed), None)
-    return failed or replace(same[0], wall=statistics.median(p.wall for p in same))
+    failed = next((p for p in same if p.error is None), None)
+    return failed or same[0]._replace(wall=median(p.wall for p in same))
 
 
 def choose(found: list[Point]) -> list[Point]:
     """Of the penalties of a panel, show those with the best stiffness only."""
-    best = {}
-    for p in found:
-        if p.method == "penalty" and not p.failed and p.error <= best.get(p.panel, p).error:
-            best[p.panel] = p
+    best = {}  # the start of the setting, by panel
+    for p in sorted((p for p in found if p.error is not None), key=lambda p: -p.error):
+        if p.method == "penalty":
+            best[p.panel] = p.setting.partition("steps")[0]
     return [
-        replace(p, shown=p.method != "penalty" or stiffness(p) == stiffness(best.get(p.panel, p)))
+        p._replace(shown="no")
+        if p.method == "penalty" and not p.setting.startswith(best.get(p.panel, ""))
+        else p
         for p in found
     ]
 
 
-def stiffness(point: Point) -> str:
-    """Of a penalty, as its setting says it."""
-    return point.setting.split(",")[0]
-
-
-def save(folder: Path, first: str, titles: dict[str, str], found: list[Point]) -> None:
-    """Table and words."""
-    folder.mkdir(parents=True, exist_ok=True)
-    points.write(folder / "pareto.csv", found)
-    text = words.report(first, titles, found)
-    (folder / "pareto.txt").write_text(text, encoding="utf-8")
-    print(text)
-
-
 def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:
-    """Where matplotlib is installed, the picture of all panels and that of four."""
-    try:
-        from chart import picture
-    except ImportError:
-        print("no picture: matplotlib is not installed (extra 'plot')")
-        return
+    """The picture of all panels and that of four."""
+    from chart import picture  # matplotlib: the table needs none
+
     picture.draw(folder / "pareto.png", titles, found)
     if {p.panel for p in found}.issuperset(picture.SUMMARY):
         picture.draw(folder / "summary.png", picture.SUMMARY, found)
 
 
-def head(python: str, repeats: int, seconds: float) -> str:
+def head(python: str, rounds: list, seconds: float) -> str:
     """Date, machine, versions, rules."""
     return (
-        f"Error against wall time, {repeats} run(s) of each, {seconds:.0f} s in all.\n"
-        f"{machine.line('cpu')}; outside: {outside.versions(python)}.\n"
+        f"Error against wall time, {len(rounds)} run(s) of each, {seconds:.0f} s in all.\n"
+        f"{machine.line('cpu')}; outside: {versions(python)}.\n"
         "Kernels are compiled and the first frame is stepped before the clock starts. Failures are "
         "behind everything. Error and time of a method are those of the same setting."
     )

@@ -15,14 +15,12 @@ fast one.
 """
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from chart.scenes import overlaps
-from engines import outside
-from engines.runs import runs
-from engines.settings import DEFAULT, SWEEPS
-from engines.task import Failed, Motion, Task
+from engines.ours import DEFAULT
+from engines.runs import SWEEPS, runs, versions
+from engines.task import Motion, Task
 from measure import machine
 from measure.report import Table
 from measure.run import command_line, one_of
@@ -32,11 +30,7 @@ from warp_contact import scenes
 
 FPS = 60
 LIMIT, QUICK_LIMIT = 400.0, 20.0  # wall seconds of one run
-SETTINGS = {  # of each engine outside: fast, plain
-    "Newton VBD": ((5, 5, 1, 0.1), (10, 10, 1, 0.1)),
-    "Newton XPBD": ((10, 2, 0.2, 0.43), (10, 10, 0.2, 0.43)),
-    "MuJoCo flex": ((4, 20, 2, 0.01), (8, 20, 2, 0.01)),
-}
+SETTINGS = {"Newton VBD": (1, 5), "Newton XPBD": (8, 4), "MuJoCo flex": (2, 5)}  # fast, plain
 COLUMNS = {"scene": 18, "engine": 13, "steps": 6, "s / s": 8, "overlap": 9, "at the end": 10}
 TABLE = Table(**COLUMNS, inverted=0)
 
@@ -51,8 +45,7 @@ def two_blocks() -> wc.Scene:
     return scene
 
 
-OURS = {DEFAULT.method: "warp_contact"}
-RACES: dict[str, tuple[Callable[[], wc.Scene], float, int]] = {  # scene, [s], settings
+RACES = {  # scene, time [s], settings of each engine outside
     "two_blocks": (two_blocks, 1.0, 2),
     "squeezed_sphere": (scenes.load("squeezed_sphere").build, 1.0, 2),
     "cubes_on_membrane": (scenes.load("cubes_on_membrane").build, 1.0, 2),
@@ -69,37 +62,31 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="write the table there too")
     parser.add_argument("--python", default=sys.executable, help="interpreter with the engines")
     args = parser.parse_args()
-    lines = [f"{machine.line('cpu')}; outside: {outside.versions(args.python)}", "", TABLE.head()]
+    lines = [f"{machine.line('cpu')}; outside: {versions(args.python)}", "", TABLE.head()]
     print(*lines, sep="\n", flush=True)
     for name in args.scenes or RACES:
         build, seconds, settings = RACES[name]
         task = Task(build, FPS, round(seconds * FPS))
         settings, limit = (1, QUICK_LIMIT) if args.quick else (settings, LIMIT)
-        others = fast_and_plain(settings)
+        others = {
+            engine: [SWEEPS[engine][1][k] for k in SETTINGS[engine][:settings]] for engine in SWEEPS
+        }
         for engine, _, motion in runs(task, [DEFAULT], others, args.python, limit):
-            lines.append(row(name, task, OURS.get(engine, engine), motion))
+            engine = "warp_contact" if engine == DEFAULT.method else engine
+            lines.append(TABLE.line(name, engine, *cells(task, motion)))
             print(lines[-1], flush=True)
     if args.out:
         args.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return 0
 
 
-def fast_and_plain(count: int) -> dict[str, list[dict]]:
-    """So many settings of each engine outside."""
-    return {
-        engine: [dict(zip(SWEEPS[engine][0], v, strict=True)) for v in values[:count]]
-        for engine, values in SETTINGS.items()
-    }
-
-
-def row(name: str, task: Task, engine: str, motion: Motion | Failed) -> str:
-    """A line of the table; a failure ends with its reason."""
-    if isinstance(motion, Failed):
-        wall = "" if motion.wall is None else f"{motion.wall:.3g}"
-        return TABLE.line(name, engine, "", wall, "", "", str(motion))
+def cells(task: Task, motion: Motion) -> list[str]:
+    """Of the line of a motion; that of a failure ends with its reason."""
+    wall = "" if motion.wall is None else f"{motion.wall:.3g}"
+    if motion.reason:
+        return ["", wall, "", "", motion.reason]
     deepest, last, inverted = look(task, motion)
-    cells = str(motion.steps), f"{motion.wall:.3g}", f"{deepest:.2g}", f"{last:.2g}", str(inverted)
-    return TABLE.line(name, engine, *cells)
+    return [str(motion.steps), wall, f"{deepest:.2g}", f"{last:.2g}", str(inverted)]
 
 
 def look(task: Task, motion: Motion) -> tuple[float, float, int]:

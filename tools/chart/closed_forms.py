@@ -10,15 +10,14 @@ from functools import cache
 
 import numpy as np
 from engines.task import Failed, Motion, Task
+from measure.figure import rms
 from verification import collision, hertz, weight
 from verification.columns import Column, Pile
 from verification.setup import G, on_face
 
 import warp_contact as wc
-from chart.laws import STEPS, squeeze
-from chart.panel import Panel, late, sound
+from chart.panel import STEPS, Elastic, Panel, Shown, late, sound, squeeze
 
-Shown = tuple[Task, list[Panel]]
 ZETA = 0.35  # damping ratio of the slowest mode, where bodies come to rest
 
 
@@ -33,77 +32,71 @@ def lowered(scene: wc.Scene, v: float) -> wc.Scene:
 # the engine's own law carry the same pressure.
 
 SOFT, STIFF, OVERLAP, SPACE = 1e5, 1e6, 0.1, 0.02  # [Pa], [Pa], [m], [m]
-PUSH, SETTLE, PUSH_FPS = 0.3, 1.0, 60  # [s], [s], [1/s]
+PUSH, SETTLE, PUSH_FPS = 18, 60, 60  # frames, frames, [1/s]
 SPEED = 10.0  # of the waves in both columns [m/s]
 CELLS, QUICK_CELLS = ((3, 3, 6), (4, 4, 6)), ((2, 2, 4), (3, 3, 4))
 
 
 def springs(quick: bool) -> Shown:
     """A1."""
-    push, beta = round(PUSH * PUSH_FPS), 2.0 * ZETA / (0.5 * np.pi * SPEED)
     columns = [
-        Column(young, 1.0, young / SPEED**2, cells, damping=beta)
+        Column(young, 1.0, young / SPEED**2, cells, damping=2.0 * ZETA / (0.5 * np.pi * SPEED))
         for young, cells in zip((SOFT, STIFF), QUICK_CELLS if quick else CELLS, strict=True)
     ]
 
     def build() -> wc.Scene:
         scene = Pile(columns, SPACE, clamped=True).build(wc.NeoHookean)
-        return lowered(scene, (OVERLAP + SPACE) * PUSH_FPS / push)
+        return lowered(scene, (OVERLAP + SPACE) * PUSH_FPS / PUSH)
 
-    task = Task(build, PUSH_FPS, push + round(SETTLE * PUSH_FPS), SOFT / 16.0, stop=push)
     title = "A1 series springs 1:10\nplace of the surface [of the overlap]"
+    task = Task(build, PUSH_FPS, PUSH + SETTLE, SOFT / 16.0, stop=PUSH)
     return task, [Panel("A1", title, place)]
 
 
 def place(task: Task, motion: Motion) -> float:
     """How far the mean heights of both faces are off, the worse of the two [of the overlap]."""
-    whole, _ = sound(task, motion)
-    exact, worst = meeting(motion.law), 0.0
-    for k, (body, part) in enumerate(zip(task.scene().bodies, whole.parts, strict=True)):
+    off, bodies = [], task.scene().bodies
+    for k, (body, part) in enumerate(zip(bodies, sound(task, motion).parts, strict=True)):
         z = motion.x[late(task), part, 2][:, on_face(body.mesh, 2, 1 - 2 * k)]
-        worst = max(worst, abs(float(z.mean()) - exact) / OVERLAP)
-    return worst
+        off.append(abs(float(z.mean()) - meeting(motion.law)) / OVERLAP)
+    return max(off)
 
 
 @cache
 def meeting(law: str) -> float:
     """Height at which both columns carry the same pressure [m]."""
-    soft, stiff = (body.material.lame() for body in springs(True)[0].scene().bodies)
     p = 0.0
     for _ in range(STEPS):
-        gap = 2.0 - OVERLAP - squeeze(p, *soft, law) - squeeze(p, *stiff, law)
-        p -= gap / (1.0 / SOFT + 1.0 / STIFF)
-    return squeeze(p, *soft, law)
+        soft, stiff = (squeeze(p, young, law) for young in (SOFT, STIFF))
+        p += (soft + stiff + OVERLAP - 2.0) / (1.0 / SOFT + 1.0 / STIFF)
+    return soft
 
 
 # A3: the cap of a sphere pressed onto a plane by a given depth.
 
 FINE, QUICK_FINE = 2, 1  # elements across the radius of contact
-HERTZ_PUSH, HERTZ_SETTLE, HERTZ_FPS = 0.01, 0.015, 1000  # [s], [s], [1/s]
+HERTZ_PUSH, HERTZ_SETTLE, HERTZ_FPS = 10, 15, 1000  # frames, frames, [1/s]
 HERTZ_SPACE = 1e-4  # at the start [m]
-E_STAR = hertz.modulus(hertz.YOUNG)
-CONTACT = hertz.contact_radius(hertz.LOADS[1], hertz.RADIUS, E_STAR)  # radius [m]
 
 
 def pressed(quick: bool) -> Shown:
     """A3."""
     n = QUICK_FINE if quick else FINE
-    depth = CONTACT**2 / hertz.RADIUS
-    push = round(HERTZ_PUSH * HERTZ_FPS)
+    depth = hertz.CONTACT**2 / hertz.RADIUS
 
     def build() -> wc.Scene:
         scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
         scene.add_plane((0.0, 0.0, 1.0), 0.0)
-        mesh = hertz.cap(hertz.RADIUS, CONTACT / n, hertz.RINGS[n])
+        mesh = hertz.cap(hertz.RADIUS, hertz.CONTACT / n, hertz.RINGS[n])
         omega = 0.5 * np.pi * hertz.pressure_wave(hertz.YOUNG) / hertz.HEIGHT
         rubber = wc.NeoHookean(hertz.YOUNG, hertz.POISSON, hertz.DENSITY, 2.0 * ZETA / omega)
         held = mesh.vertices[:, 2] > 0.999 * hertz.HEIGHT
         scene.add_body(mesh, rubber, (0.0, 0.0, HERTZ_SPACE), fixed=held)
-        return lowered(scene, (depth + HERTZ_SPACE) * HERTZ_FPS / push)
+        return lowered(scene, (depth + HERTZ_SPACE) * HERTZ_FPS / HERTZ_PUSH)
 
-    frames = push + round(HERTZ_SETTLE * HERTZ_FPS)
-    task = Task(build, HERTZ_FPS, frames, hertz.YOUNG * CONTACT / n, stop=push)
+    stiffness = hertz.YOUNG * hertz.CONTACT / n
     title = f"A3 Hertz, {n} element(s) across\npressure at the middle [of exact]"
+    task = Task(build, HERTZ_FPS, HERTZ_PUSH + HERTZ_SETTLE, stiffness, stop=HERTZ_PUSH)
     return task, [Panel("A3", title, peak)]
 
 
@@ -114,32 +107,26 @@ def peak(task: Task, motion: Motion) -> float:
     plane above makes the body stiffer, and the mesh has its error too: whoever comes to rest on it
     meets at that floor, not at zero.
     """
-    _, solid = sound(task, motion)
+    solid = sound(task, motion)
     body = task.scene().bodies[0]
     force = np.mean([solid.forces(x) for x in motion.x[late(task)]], axis=0)
-    under = hertz.on_ball(body)
-    lowest = np.flatnonzero(under)[np.hypot(*body.mesh.vertices[under, :2].T).argmin()]
-    p = -force[lowest, 2] / areas(body.mesh)[lowest]
-    p0 = 2.0 * E_STAR * CONTACT / (np.pi * hertz.RADIUS)
-    return abs(float(p) / p0 - 1.0)
-
-
-def areas(mesh: wc.TetMesh) -> np.ndarray:
-    """A third of the surface around each vertex [m^2]."""
-    a, b, c = np.moveaxis(mesh.vertices[mesh.surface], 1, 0)
-    third = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(mesh.surface.ravel(), np.repeat(third, 3), minlength=len(mesh.vertices))
+    under = np.flatnonzero(hertz.on_ball(body))
+    lowest = under[np.hypot(*body.mesh.vertices[under, :2].T).argmin()]
+    around = body.mesh.surface[(body.mesh.surface == lowest).any(axis=1)]
+    a, b, c = np.moveaxis(body.mesh.vertices[around], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 6.0  # a third of the triangles
+    p0 = 2.0 * hertz.E_STAR * hertz.CONTACT / (np.pi * hertz.RADIUS)
+    return abs(float(-force[lowest, 2] / area / p0) - 1.0)
 
 
 # A6: two undamped free blocks, the second ten times as dense, meet head-on.
 
 DENSER = 10.0
-FREE_FPS, FREE_TIME = 240, 0.25  # [1/s], [s]
+FREE_FPS, FREE_FRAMES = 240, 60
 
 
-def free(quick: bool) -> Shown:
+def free(_: bool) -> Shown:
     """A6: momentum and energy; the quick run is the same."""
-    del quick
 
     def build() -> wc.Scene:
         return collision.thrown((3, 5), "head-on", DENSER)
@@ -149,12 +136,12 @@ def free(quick: bool) -> Shown:
         Panel("A6p", title.format("change of momentum"), drift),
         Panel("A6e", title.format("energy gained or lost"), work),
     ]
-    return Task(build, FREE_FPS, round(FREE_TIME * FREE_FPS), 500.0), panels
+    return Task(build, FREE_FPS, FREE_FRAMES, 500.0), panels
 
 
 def drift(task: Task, motion: Motion) -> float:
     """Largest change of momentum after any frame, of sum m |v| at the start."""
-    m = met(task, motion)[0].mass
+    m = met(task, motion).mass
     p = np.einsum("i,fij->fj", m, motion.v.astype(float))
     scale = m @ np.linalg.norm(motion.v[0], axis=1)
     return float(np.linalg.norm(p - p[0], axis=1).max() / scale)
@@ -165,39 +152,33 @@ def work(task: Task, motion: Motion) -> float:
 
     Undamped and without friction exact is none; a loss counts as well as a gain.
     """
-    whole, solid = met(task, motion)
-
-    def energy(k: int) -> float:
-        kinetic = 0.5 * whole.mass @ (motion.v[k].astype(float) ** 2).sum(axis=1)
-        return kinetic + solid.energy(motion.x[k])
-
-    end = range(task.frames + 1 - task.frames // 3, task.frames + 1)
-    return abs(float(np.mean([energy(k) for k in end])) / energy(0) - 1.0)
+    solid = met(task, motion)
+    kinetic = 0.5 * (motion.v.astype(float) ** 2).sum(axis=2) @ solid.mass
+    energy = kinetic + [solid.energy(x) for x in motion.x]
+    return abs(float(energy[late(task, 1.0 / 3.0)].mean() / energy[0]) - 1.0)
 
 
-def met(task: Task, motion: Motion):
+def met(task: Task, motion: Motion) -> Elastic:
     """As ``sound``; ``Failed`` as well unless the blocks have met and parted."""
-    found = whole, _ = sound(task, motion)
-    first, second = (motion.v[-1, part, 2].mean() for part in whole.parts)
+    solid = sound(task, motion)
+    first, second = (motion.v[-1, part, 2].mean() for part in solid.parts)
     if not second - first > 0.0:
         raise Failed("the blocks do not part")
-    return found
+    return solid
 
 
 # A7m: a light cube carries one a hundred times as dense; they start where linear bars would rest,
 # and their damping takes 1.25 s until less than 0.01 % of the weight is left of that error.
 
 RATIO = 100.0
-EDGE, LIGHT = weight.EDGE, weight.DENSITY  # [m], [kg/m^3]
-LADDER_FPS, LADDER_TIME = 240, 1.5  # [1/s], [s]
+LADDER_FPS, LADDER_FRAMES = 240, 360
 LADDER_ZETA = 0.1  # a small part of the rate at which the light cube alone would be damped
 
 
-def ladder(quick: bool) -> Shown:
+def ladder(_: bool) -> Shown:
     """A7m; the quick run is the same."""
-    del quick
-    young = 20.0 * RATIO * LIGHT * G * EDGE  # 5 % of strain
-    omega = np.sqrt(young / (RATIO * LIGHT)) / EDGE
+    young = 20.0 * RATIO * weight.DENSITY * G * weight.EDGE  # 5 % of strain
+    omega = np.sqrt(young / (RATIO * weight.DENSITY)) / weight.EDGE
     pile = weight.cubes(RATIO, young, 2.0 * LADDER_ZETA / omega)
 
     def build() -> wc.Scene:
@@ -206,9 +187,8 @@ def ladder(quick: bool) -> Shown:
     def start(scene: wc.Scene) -> np.ndarray:
         return np.concatenate(pile.static(scene))
 
-    frames = round(LADDER_TIME * LADDER_FPS)
-    task = Task(build, LADDER_FPS, frames, 0.1 * young * EDGE, start=start)
     title = f"A7m heavy on light 1:{RATIO:g}\nforce and its ripple [of the weight]"
+    task = Task(build, LADDER_FPS, LADDER_FRAMES, 0.1 * young * weight.EDGE, start=start)
     return task, [Panel("A7m", title, carried)]
 
 
@@ -217,9 +197,9 @@ def carried(task: Task, motion: Motion) -> float:
 
     The force is what its stresses hand to its held base, less its own weight.
     """
-    whole, solid = sound(task, motion)
-    light, heavy = whole.parts
+    solid = sound(task, motion)
+    light, heavy = solid.parts
     base = task.scene().bodies[0].fixed
-    own, load = whole.mass[light][~base].sum() * G, whole.mass[heavy].sum() * G
+    own, load = solid.mass[light][~base].sum() * G, solid.mass[heavy].sum() * G
     forces = [-solid.forces(x)[light][base, 2].sum() - own for x in motion.x[late(task)]]
-    return float(np.sqrt(np.mean(np.square(np.array(forces) / load - 1.0))))
+    return rms(np.array(forces) / load - 1.0)

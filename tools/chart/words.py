@@ -4,7 +4,6 @@ from operator import attrgetter
 
 from chart.points import Point, dominates, fastest_below, front
 
-DEFAULT = "default"
 LEVELS = 0.05, 0.01, 0.001  # errors at which times are compared
 TIMES = 1.0, 10.0  # wall seconds per simulated second at which errors are compared
 BY_ERROR, BY_WALL = attrgetter("error"), attrgetter("wall")
@@ -14,22 +13,21 @@ def report(head: str, titles: dict[str, str], points: list[Point]) -> str:
     """All panels, after ``head``: machine, versions, date."""
     parts = [head]
     for name, title in titles.items():
-        mine = [p for p in points if p.panel == name and p.shown]
-        if mine:
-            parts.append("\n".join([title.replace("\n", ": "), *panel(mine)]))
+        mine = [p for p in points if p.panel == name and p.shown == "yes"]
+        parts.append("\n".join([title.replace("\n", ": "), *panel(mine)]))
     return "\n\n".join(parts) + "\n"
 
 
 def panel(points: list[Point]) -> list[str]:
     """Who is on the front, behind it, before the default; times at equal error; failures."""
     of = {p.method: [q for q in points if q.method == p.method] for p in points}
-    fine = {method: [p for p in mine if not p.failed] for method, mine in of.items()}
+    fine = {method: [p for p in mine if p.error is not None] for method, mine in of.items()}
     ahead = front(points)
     lines = [f"  front: {_show(p)}" for p in ahead] or ["  front: empty, every run failed"]
     for method, mine in fine.items():
         if mine and method not in {p.method for p in ahead}:
             lines.append(f"  behind the front: {_show(min(mine, key=BY_ERROR))} is its best")
-    own = front(of.get(DEFAULT, []))
+    own = front(of.get("default", []))
     if own:
         before = [m for m in of if any(dominates(p, q) for p in of[m] for q in own)]
         said = ", ".join(before) or "none"
@@ -44,10 +42,10 @@ def panel(points: list[Point]) -> list[str]:
         said = ", ".join(f"{p.method} {p.error:.2g}" for p in first) or "none"
         lines.append(f"  within {time:g} s per s: {said}")
     for method, mine in of.items():
-        failed = [p for p in mine if p.failed]
-        if failed:
-            why = "; ".join(dict.fromkeys(p.outcome for p in failed))
-            lines.append(f"  failed: {method}, {len(failed)} of {len(mine)}: {why}")
+        why = [p.outcome for p in mine if p.error is None]
+        if why:
+            said = "; ".join(dict.fromkeys(why))
+            lines.append(f"  failed: {method}, {len(why)} of {len(mine)}: {said}")
     return lines
 
 

@@ -1,41 +1,128 @@
-"""Run a task with many methods, one after the other."""
+"""Run a task with many methods, one after the other: our own, then those of engines outside.
 
+These get plain arrays and hand back positions. The adapter of an engine, a file beside this one,
+runs in a process of its own, under an interpreter that may have other packages. One process takes
+all settings of a task; each result is written as it comes, so that a process which dies takes none
+with it.
+"""
+
+import pickle
+import subprocess
+import tempfile
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from types import SimpleNamespace
 
-from engines import ours, outside
-from engines.settings import Own
-from engines.task import Failed, Motion, Task
+import numpy as np
 
-Run = tuple[str, str, Motion | Failed]  # method, its knobs as text, what came of it
+from engines import ours
+from engines.task import Motion, Numbered, Task
+
+Run = tuple[str, str, Motion]  # method, its knobs as text, what came of it
+ENGINES = {  # their adapters and their laws of elasticity
+    "Newton VBD": ("newton_solvers.py", "neo-hookean"),
+    "Newton XPBD": ("newton_solvers.py", "neo-hookean"),
+    "MuJoCo flex": ("mujoco_flex.py", "st-venant"),
+}
+SWEEPS = {  # knobs, which the adapters explain, and their values
+    "Newton VBD": (
+        ("steps", "iterations", "contact", "margin"),
+        ((2, 5, 1, 0.1), (5, 5, 1, 0.1), (2, 5, 10, 0.002), (5, 5, 10, 0.02), (5, 5, 10, 0.002))
+        + ((10, 10, 1, 0.1), (10, 10, 10, 0.02), (10, 10, 10, 0.002), (20, 20, 10, 0.002))
+        + ((5, 5, 1, 0.02),),
+    ),
+    "Newton XPBD": (
+        ("steps", "iterations", "relaxation", "radius"),
+        ((5, 10, 0.2, 0.3), (10, 2, 0.2, 0.3), (10, 10, 0.2, 0.3), (5, 10, 0.2, 0.43))
+        + ((10, 10, 0.2, 0.43), (10, 20, 0.1, 0.3), (32, 2, 0.2, 0.3), (32, 10, 0.4, 0.3))
+        + ((10, 2, 0.2, 0.43), (20, 10, 0.1, 0.43)),
+    ),
+    "MuJoCo flex": (
+        ("steps", "iterations", "time_constant", "radius"),
+        ((1, 20, 2, 0.01), (2, 20, 2, 0.01), (4, 20, 2, 0.01), (2, 20, 2, 1e-4), (4, 20, 2, 1e-4))
+        + ((8, 20, 2, 0.01), (16, 20, 2, 0.01), (8, 20, 2, 1e-4), (16, 20, 2, 1e-4))
+        + ((16, 100, 10, 0.01),),
+    ),
+}
+GRACE = 300.0  # seconds for imports and kernels, on top of the limits of the runs
+VERSIONS = """from importlib import metadata as m
+for p in "newton", "mujoco", "warp-lang":
+    print(p, m.version(p) if list(m.distributions(name=p)) else "not installed")"""
 
 
 def runs(
-    task: Task, own: Iterable[Own], others: dict[str, list[dict]], python: str, limit: float
+    task: Task, own: Iterable[ours.Own], others: dict[str, Iterable], python: str, limit: float
 ) -> Iterator[Run]:
-    """Every setting of this package and of the engines outside.
+    """Every setting of our own and of the ``others``, whose engines the interpreter ``python`` has.
 
-    Args:
-        task: what to run
-        own: settings of this package; steps are multiples of those that a method takes by itself
-        others: settings of each engine outside
-        python: interpreter that has these
-        limit: wall seconds after which one run is given up
+    The others are rows of ``SWEEPS``. A run is given up after ``limit`` wall seconds. Steps of our
+    own are multiples of those that the same method takes by itself.
     """
-    steps: dict[tuple, int] = {}
+    steps: dict[tuple, int | None] = {}
     for setting in own:
         alike = setting.method, setting.times
-        try:
-            if setting.factor == 1:
-                motion = ours.run(task, setting, None, limit)
-                steps[alike] = motion.steps
-            elif alike in steps:
-                motion = ours.run(task, setting, setting.factor * steps[alike], limit)
-            else:
-                raise Failed("no run with steps x1")
-        except Failed as failed:
-            motion = failed
+        if setting.factor == 1:
+            motion = ours.run(task, setting, None, limit)
+            steps[alike] = motion.steps
+        elif steps.get(alike):
+            motion = ours.run(task, setting, setting.factor * steps[alike], limit)
+        else:
+            motion = Motion(reason="no run with steps x1")
         yield setting.method, str(setting), motion
-    for engine, settings in others.items():
-        motions = outside.run(task, engine, settings, python, limit)
-        for setting, motion in zip(settings, motions, strict=True):
+    for engine, rows in others.items():
+        settings = [dict(zip(SWEEPS[engine][0], row, strict=True)) for row in rows]
+        for setting, motion in zip(
+            settings, outside(task, engine, settings, python, limit), strict=True
+        ):
             yield engine, ", ".join(f"{k} {value:g}" for k, value in setting.items()), motion
+
+
+def outside(
+    task: Task, engine: str, settings: list[dict], python: str, limit: float
+) -> Iterator[Motion]:
+    """The motion of every setting in turn."""
+    adapter, law = ENGINES[engine]
+    with tempfile.TemporaryDirectory() as folder:
+        results = Path(folder) / "results"
+        results.touch()
+        job = plain(task), (task.fps, task.frames, task.stop, limit), settings
+        (Path(folder) / "job").write_bytes(pickle.dumps(job))
+        command = [python, str(Path(__file__).with_name(adapter)), folder, engine]
+        timeout = GRACE + limit * len(settings)
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=timeout)
+            reason = done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode}"
+        except subprocess.TimeoutExpired:
+            reason = "too slow: the process was stopped"
+        with open(results, "rb") as file:
+            for _ in settings:
+                try:
+                    yield Motion(law=law, **pickle.load(file))
+                except (EOFError, pickle.UnpicklingError):
+                    yield Motion(reason=reason)
+
+
+def plain(task: Task) -> SimpleNamespace:
+    """The scene of a task as arrays, numbered through all bodies."""
+    scene = task.scene()
+    whole = Numbered(scene)
+    found = SimpleNamespace(fps=task.fps, gravity=scene.gravity, friction=scene.friction, bodies=[])
+    found.planes = [(n.tolist(), h) for n, h in scene.planes]
+    found.rest, found.x = whole.rest, task.start(scene)  # (n, 3) [m]: as placed, at the start
+    found.v = np.concatenate([body.v for body in scene.bodies])  # (n, 3) [m/s]
+    found.fixed = np.concatenate([body.fixed for body in scene.bodies])
+    found.mass = whole.mass  # (n,) [kg]
+    found.edge = np.inf  # mean one of the surface of the finest body [m]
+    for body, part in zip(scene.bodies, whole.parts, strict=True):
+        own = asdict(body.material) | {"lame": body.material.lame(), "tets": body.mesh.tets}
+        found.bodies.append(SimpleNamespace(part=part, **own))
+        sides = body.x[body.mesh.surface] - body.x[np.roll(body.mesh.surface, 1, axis=1)]
+        found.edge = min(found.edge, float(np.linalg.norm(sides, axis=2).mean()))
+    return found
+
+
+def versions(python: str) -> str:
+    """What is installed under an interpreter of the engines outside."""
+    done = subprocess.run([python, "-c", VERSIONS], capture_output=True, text=True)
+    return ", ".join(done.stdout.splitlines())

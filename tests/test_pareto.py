@@ -160,15 +160,15 @@ def test_the_table_keeps_every_point(tmp_path):
 
 
 def test_words_and_picture_keep_every_failure(tmp_path):
-    from chart import words
+    from chart.points import report
 
-    text = words.report("head", {"A": "title"}, points())
+    text = report("head", {"A": "title"}, points())
     assert "failed: broken, 1 of 1: not finite" in text
     assert "failed: absent, 1 of 1: not installed" in text
     assert "behind the front: slow" in text
     assert "of the default's front" not in text  # there is no default
     named = [p._replace(method="default") if p.method == "slow" else p for p in points()]
-    text = words.report("head", {"A": "title"}, named)
+    text = report("head", {"A": "title"}, named)
     assert "than a point of the default's front: exact, between, equal\n" in text
     pyplot = pytest.importorskip("matplotlib.pyplot")
     from chart import picture

@@ -19,7 +19,7 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
-from chart import closed_forms, points, scenes, words
+from chart import closed_forms, points, scenes
 from chart.panel import Panel
 from chart.points import Point
 from engines import ours
@@ -33,12 +33,14 @@ TASKS = {
     "A3": closed_forms.pressed,
     "A6": closed_forms.free,
     "A7m": closed_forms.ladder,
-    "squeezed_sphere": partial(scenes.scene, "squeezed_sphere"),
-    "cubes_on_membrane": partial(scenes.scene, "cubes_on_membrane"),
-}
+} | {name: partial(scenes.scene, name) for name in scenes.PRESSED}
 LIMIT, QUICK_LIMIT = 12.0, 6.0  # wall seconds of one run
 REPEATS = 3  # of everything, in turn; times are medians
 FEW = 5  # settings of each engine outside in the quick run
+HEAD = """Error against wall time, {} run(s) of each, {:.0f} s in all.
+{}; outside: {}.
+Kernels are compiled and the first frame is stepped before the clock starts. Failures are behind \
+everything. Error and time of a method are those of the same setting."""
 
 
 def main() -> int:
@@ -59,7 +61,7 @@ def main() -> int:
     few = FEW if args.quick else None
     others = {engine: rows[:few] for engine, (_, rows) in SWEEPS.items()}
     limit = QUICK_LIMIT if args.quick else LIMIT
-    begin, rounds = perf_counter(), []
+    begin, rounds, outside = perf_counter(), [], versions(args.python)
     for _ in range(args.repeats or (1 if args.quick else REPEATS)):
         rounds.append([])
         for task, panels in chosen:
@@ -67,9 +69,10 @@ def main() -> int:
                 rounds[-1] += judge(task, panels, run)
         # After every round: a long run leaves what it has.
         found = choose([middle(same) for same in zip(*rounds, strict=True)])
+        head = HEAD.format(len(rounds), perf_counter() - begin, machine.line("cpu"), outside)
         args.out.mkdir(parents=True, exist_ok=True)
         points.write(args.out / "pareto.csv", found)
-        text = words.report(head(args.python, rounds, perf_counter() - begin), titles, found)
+        text = points.report(head, titles, found)
         (args.out / "pareto.txt").write_text(text, encoding="utf-8")
         print(text)
         draw(args.out, titles, found)
@@ -80,10 +83,10 @@ def judge(task: Task, panels: list[Panel], run: Run) -> Iterator[Point]:
     """The errors of a run in all panels, printed as they come."""
     method, setting, motion = run
     for panel in panels:
-        error, outcome = None, motion.reason or "ok"
+        error, outcome = None, motion.reason
         try:
-            if not motion.reason:
-                error = panel.error(task, motion)
+            if not outcome:
+                error, outcome = panel.error(task, motion), "ok"
         except Failed as failed:
             outcome = str(failed)
         point = Point(panel.name, method, setting, motion.wall, error, outcome, motion.startup)
@@ -99,16 +102,14 @@ def middle(same: tuple[Point, ...]) -> Point:
 
 def choose(found: list[Point]) -> list[Point]:
     """Of the penalties of a panel, show those with the best stiffness only."""
-    best = {}  # the start of the setting, by panel
-    for p in sorted((p for p in found if p.error is not None), key=lambda p: -p.error):
-        if p.method == "penalty":
-            best[p.panel] = p.setting.partition("steps")[0]
-    return [
-        p._replace(shown="no")
-        if p.method == "penalty" and not p.setting.startswith(best.get(p.panel, ""))
-        else p
-        for p in found
-    ]
+    penalties = [p for p in found if p.method == "penalty" and p.error is not None]
+    worst_first = sorted(penalties, key=points.BY_ERROR, reverse=True)
+    best = {p.panel: p.setting.partition("steps")[0] for p in worst_first}
+
+    def shown(p: Point) -> bool:
+        return p.method != "penalty" or p.setting.startswith(best.get(p.panel, ""))
+
+    return [p._replace(shown="yes" if shown(p) else "no") for p in found]
 
 
 def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:
@@ -118,16 +119,6 @@ def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:
     picture.draw(folder / "pareto.png", titles, found)
     if {p.panel for p in found}.issuperset(picture.SUMMARY):
         picture.draw(folder / "summary.png", picture.SUMMARY, found)
-
-
-def head(python: str, rounds: list, seconds: float) -> str:
-    """Date, machine, versions, rules."""
-    return (
-        f"Error against wall time, {len(rounds)} run(s) of each, {seconds:.0f} s in all.\n"
-        f"{machine.line('cpu')}; outside: {versions(python)}.\n"
-        "Kernels are compiled and the first frame is stepped before the clock starts. Failures are "
-        "behind everything. Error and time of a method are those of the same setting."
-    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Scenes of many contacts side by side with engines outside: time, overlap, inverted tets.
 
-    python tools/race.py [scene ...] [--quick] [--out FILE] [--python PATH]
+    python tools/race.py [scene ...] [--quick] [--python PATH]
 
 Every engine gets the same vertices, tets, masses and coefficient of damping and is judged from its
 positions, as in ``tools/pareto.py``; each runs once, so that no time is better than the machine is
@@ -15,7 +15,6 @@ fast one.
 """
 
 import sys
-from pathlib import Path
 
 from chart.scenes import overlaps
 from engines.ours import DEFAULT
@@ -26,7 +25,7 @@ from measure.report import Table
 from measure.run import command_line, one_of
 
 import warp_contact as wc
-from warp_contact import scenes
+from warp_contact.scenes import load
 
 FPS = 60
 LIMIT, QUICK_LIMIT = 400.0, 20.0  # wall seconds of one run
@@ -47,10 +46,10 @@ def two_blocks() -> wc.Scene:
 
 RACES = {  # scene, time [s], settings of each engine outside
     "two_blocks": (two_blocks, 1.0, 2),
-    "squeezed_sphere": (scenes.load("squeezed_sphere").build, 1.0, 2),
-    "cubes_on_membrane": (scenes.load("cubes_on_membrane").build, 1.0, 2),
-    "membrane_stack": (scenes.load("membrane_stack").build, 1.0, 1),
-    "bowl": (scenes.load("bowl").build, 0.5, 1),
+    "squeezed_sphere": (load("squeezed_sphere").build, 1.0, 2),
+    "cubes_on_membrane": (load("cubes_on_membrane").build, 1.0, 2),
+    "membrane_stack": (load("membrane_stack").build, 1.0, 1),
+    "bowl": (load("bowl").build, 0.5, 1),
 }
 
 
@@ -59,24 +58,17 @@ def main() -> int:
     parser = command_line(__doc__)
     parser.add_argument("scenes", nargs="*", type=one_of(RACES), metavar="scene", help="or all")
     parser.add_argument("--quick", action="store_true", help="the fast settings, runs cut short")
-    parser.add_argument("--out", type=Path, help="write the table there too")
     parser.add_argument("--python", default=sys.executable, help="interpreter with the engines")
     args = parser.parse_args()
-    lines = [f"{machine.line('cpu')}; outside: {versions(args.python)}", "", TABLE.head()]
-    print(*lines, sep="\n", flush=True)
+    print(f"{machine.line('cpu')}; outside: {versions(args.python)}\n\n{TABLE.head()}", flush=True)
     for name in args.scenes or RACES:
-        build, seconds, settings = RACES[name]
+        build, seconds, count = RACES[name]
         task = Task(build, FPS, round(seconds * FPS))
-        settings, limit = (1, QUICK_LIMIT) if args.quick else (settings, LIMIT)
-        others = {
-            engine: [SWEEPS[engine][1][k] for k in SETTINGS[engine][:settings]] for engine in SWEEPS
-        }
+        count, limit = (1, QUICK_LIMIT) if args.quick else (count, LIMIT)
+        others = {e: [SWEEPS[e][1][k] for k in rows[:count]] for e, rows in SETTINGS.items()}
         for engine, _, motion in runs(task, [DEFAULT], others, args.python, limit):
-            engine = "warp_contact" if engine == DEFAULT.method else engine
-            lines.append(TABLE.line(name, engine, *cells(task, motion)))
-            print(lines[-1], flush=True)
-    if args.out:
-        args.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+            who = "warp_contact" if engine == DEFAULT.method else engine
+            print(TABLE.line(name, who, *cells(task, motion)), flush=True)
     return 0
 
 

@@ -6,7 +6,7 @@ material damps stiffness-proportionally where the state of rest is asked for, wi
 coefficient for all.
 """
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from engines.task import Failed, Motion, Task
@@ -121,22 +121,15 @@ def peak(task: Task, motion: Motion) -> float:
 
 # A6: two undamped free blocks, the second ten times as dense, meet head-on.
 
-DENSER = 10.0
-FREE_FPS, FREE_FRAMES = 240, 60
-
 
 def free(_: bool) -> Shown:
     """A6: momentum and energy; the quick run is the same."""
-
-    def build() -> wc.Scene:
-        return collision.thrown((3, 5), "head-on", DENSER)
-
-    title = "A6 free collision 1:10\n{} [of that at the start]"
     panels = [
-        Panel("A6p", title.format("change of momentum"), drift),
-        Panel("A6e", title.format("energy gained or lost"), work),
+        Panel("A6p", "A6 free collision 1:10\nchange of momentum [of that at the start]", drift),
+        Panel("A6e", "A6 free collision 1:10\nenergy gained or lost [of that at the start]", work),
     ]
-    return Task(build, FREE_FPS, FREE_FRAMES, 500.0), panels
+    build = partial(collision.thrown, (3, 5), "head-on", 10.0)
+    return Task(build, fps=240, frames=60, stiffness=500.0), panels
 
 
 def drift(task: Task, motion: Motion) -> float:
@@ -171,7 +164,6 @@ def met(task: Task, motion: Motion) -> Elastic:
 # and their damping takes 1.25 s until less than 0.01 % of the weight is left of that error.
 
 RATIO = 100.0
-LADDER_FPS, LADDER_FRAMES = 240, 360
 LADDER_ZETA = 0.1  # a small part of the rate at which the light cube alone would be damped
 
 
@@ -181,14 +173,12 @@ def ladder(_: bool) -> Shown:
     omega = np.sqrt(young / (RATIO * weight.DENSITY)) / weight.EDGE
     pile = weight.cubes(RATIO, young, 2.0 * LADDER_ZETA / omega)
 
-    def build() -> wc.Scene:
-        return pile.build(wc.NeoHookean)
-
     def start(scene: wc.Scene) -> np.ndarray:
         return np.concatenate(pile.static(scene))
 
+    build, stiffness = partial(pile.build, wc.NeoHookean), 0.1 * young * weight.EDGE
+    task = Task(build, fps=240, frames=360, stiffness=stiffness, start=start)
     title = f"A7m heavy on light 1:{RATIO:g}\nforce and its ripple [of the weight]"
-    task = Task(build, LADDER_FPS, LADDER_FRAMES, 0.1 * young * weight.EDGE, start=start)
     return task, [Panel("A7m", title, carried)]
 
 

@@ -1,12 +1,15 @@
-"""The points of the chart: their table, and who of them is ahead."""
+"""The points of the chart: their table, who of them is ahead, and that in words."""
 
 import csv
-from math import inf
+from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
 HEAD = "panel", "method", "setting", "wall s per simulated s", "error", "outcome"
 HEAD += "start-up s", "shown"
+LEVELS = 0.05, 0.01, 0.001  # errors at which times are compared
+TIMES = 1.0, 10.0  # wall seconds per simulated second at which errors are compared
+BY_WALL, BY_ERROR = attrgetter("wall"), attrgetter("error")
 
 
 class Point(NamedTuple):
@@ -31,30 +34,72 @@ def write(path: Path, points: list[Point]) -> None:
 def read(path: Path) -> list[Point]:
     """The points of a table that ``write`` wrote."""
     with open(path, newline="", encoding="utf-8") as file:
-        rows = [Point(*row) for row in csv.reader(file)][1:]
-    numbers = "wall", "error", "startup"
-    return [
-        p._replace(**{k: float(n) if (n := getattr(p, k)) else None for k in numbers}) for p in rows
-    ]
-
-
-def cost(p: Point) -> tuple[float, float]:
-    """Time and error; a failure is behind everything."""
-    return (inf, inf) if p.error is None else (p.wall, p.error)
+        rows = list(csv.reader(file))[1:]
+    found = []
+    for *names, wall, error, outcome, startup, shown in rows:
+        wall, error, startup = (float(n) if n else None for n in (wall, error, startup))
+        found.append(Point(*names, wall, error, outcome, startup, shown))
+    return found
 
 
 def dominates(a: Point, b: Point) -> bool:
     """Whether ``a`` is no worse in time and error, and better in one; failures dominate nothing."""
-    (time, error), (other_time, other_error) = cost(a), cost(b)
-    return time <= other_time and error <= other_error and cost(a) != cost(b)
+    if a.error is None or b.error is None:
+        return a.error is not None
+    return a.wall <= b.wall and a.error <= b.error and (a.wall, a.error) != (b.wall, b.error)
 
 
 def front(points: list[Point]) -> list[Point]:
     """The points that none dominates, the fastest first; failures are never among them."""
     fine = [p for p in points if p.error is not None]
-    return sorted((p for p in fine if not any(dominates(q, p) for q in fine)), key=cost)
+    return sorted((p for p in fine if not any(dominates(q, p) for q in fine)), key=BY_WALL)
 
 
 def fastest_below(points: list[Point], error: float) -> Point | None:
     """The quickest point with at most this error."""
-    return min((p for p in points if cost(p)[1] <= error), key=cost, default=None)
+    fine = (p for p in points if p.error is not None and p.error <= error)
+    return min(fine, key=BY_WALL, default=None)
+
+
+def report(head: str, titles: dict[str, str], points: list[Point]) -> str:
+    """All panels, after ``head``: machine, versions, date."""
+    parts = [head]
+    for name, title in titles.items():
+        mine = [p for p in points if p.panel == name and p.shown == "yes"]
+        parts.append("\n".join([title.replace("\n", ": "), *panel(mine)]))
+    return "\n\n".join(parts) + "\n"
+
+
+def panel(points: list[Point]) -> list[str]:
+    """Who is on the front, behind it, before the default; times at equal error; failures."""
+    of = {p.method: [q for q in points if q.method == p.method] for p in points}
+    fine = {method: [p for p in mine if p.error is not None] for method, mine in of.items()}
+    ahead = front(points)
+    lines = [f"  front: {_show(p)}" for p in ahead] or ["  front: empty, every run failed"]
+    for method, mine in fine.items():
+        if mine and method not in {p.method for p in ahead}:
+            lines.append(f"  behind the front: {_show(min(mine, key=BY_ERROR))} is its best")
+    own = front(of.get("default", []))
+    if own:
+        before = [m for m in of if any(dominates(p, q) for p in of[m] for q in own)]
+        said = ", ".join(before) or "none"
+        lines.append(f"  faster and no less accurate than a point of the default's front: {said}")
+    for level in LEVELS:
+        first = sorted(filter(None, (fastest_below(of[m], level) for m in of)), key=BY_WALL)
+        said = ", ".join(f"{p.method} {p.wall:.3g} s" for p in first) or "none"
+        lines.append(f"  error at most {level:g}: {said}")
+    for time in TIMES:
+        within = [[p for p in mine if p.wall <= time] for mine in fine.values()]
+        first = sorted((min(w, key=BY_ERROR) for w in within if w), key=BY_ERROR)
+        said = ", ".join(f"{p.method} {p.error:.2g}" for p in first) or "none"
+        lines.append(f"  within {time:g} s per s: {said}")
+    for method, mine in of.items():
+        why = [p.outcome for p in mine if p.error is None]
+        if why:
+            said = "; ".join(dict.fromkeys(why))
+            lines.append(f"  failed: {method}, {len(why)} of {len(mine)}: {said}")
+    return lines
+
+
+def _show(p: Point) -> str:
+    return f"{p.method} ({p.setting}), {p.wall:.3g} s per s, error {p.error:.2g}"

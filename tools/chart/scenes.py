@@ -29,13 +29,10 @@ CONVERGED = 16  # times the steps
 LATE = 0.25  # part of the frames at the end in which the bodies of a pair touch
 TUNNELLED = 1.0  # of an edge: an overlap or gap from which a body is on the wrong side
 PRESSED = {  # title, bodies that are squeezed together, or rest on each other, by their labels
-    "squeezed_sphere": (
-        "squeezed sphere",
-        (("lower_cube", "sphere"), ("sphere", "upper_cube")),
-    ),
+    "squeezed_sphere": ("squeezed sphere", (("lower_cube", "sphere"), ("sphere", "upper_cube"))),
     "cubes_on_membrane": (
         "cubes on a membrane 1:4:16",
-        (("membrane", "cube_1"), ("membrane", "cube_4"), ("membrane", "cube_16")),
+        tuple(("membrane", f"cube_{mass}") for mass in (1, 4, 16)),
     ),
 }
 
@@ -44,13 +41,14 @@ def scene(name: str, quick: bool) -> Shown:
     """A scene of the paper: overlap and gap, its overlap alone, its motion."""
     module = scenes.load(name)
     title, pressed = PRESSED[name]
+    errors = {
+        "": ("overlap or gap", apart),
+        " overlap": ("overlap alone", inside),
+        " motion": ("distance from a converged run", astray),
+    }
     panels = [
         Panel(name + end, f"{title}\n{what} [of an edge]", partial(error, pressed))
-        for end, what, error in (
-            ("", "overlap or gap", apart),
-            (" overlap", "overlap alone", inside),
-            (" motion", "distance from a converged run", astray),
-        )
+        for end, (what, error) in errors.items()
     ]
     frames = round((QUICK if quick else DURATION) * FPS)
     return Task(module.build, FPS, frames, **module.PENALTY), panels
@@ -62,15 +60,12 @@ def apart(pressed: tuple, task: Task, motion: Motion) -> float:
 
 
 def inside(pressed: tuple, task: Task, motion: Motion) -> float:
-    """Deepest overlap after any frame, in edges of the finer body of the two.
-
-    Bodies that went through each other have none any more: they have a gap.
-    """
+    """Deepest overlap after any frame, in edges of the finer body of the two."""
     sound(task, motion)
     worst = max(overlap for overlap, _ in overlaps(task, motion))
     if worst >= TUNNELLED:
         raise Failed(f"bodies inside each other ({worst:.2g} edges)")
-    gap(pressed, task, motion)
+    gap(pressed, task, motion)  # bodies that went through each other have no overlap any more
     return worst
 
 
@@ -105,8 +100,7 @@ def overlaps(task: Task, motion: Motion):
 def gap(pressed: tuple, task: Task, motion: Motion) -> float:
     """Distance of the worst of the ``pressed`` pairs, in edges of its finer body.
 
-    The median of the last frames: a hop between two impacts is no gap, one that stays is. Bodies
-    that went through each other have no overlap any more, but end further apart than an edge.
+    The median of the last frames: a hop between two impacts is no gap, one that stays is.
     """
     parts = zip(task.scene().bodies, sound(task, motion).parts, strict=True)
     found = {body.label: (body.mesh, part) for body, part in parts}

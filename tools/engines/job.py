@@ -5,10 +5,10 @@ The adapter of an engine outside is a file that calls ``main(make)`` with what m
 (``runs.plain``) and a setting, and raises ``CannotDo`` where it cannot represent the scene.
 """
 
+import os
 import pickle
 import sys
 from functools import partial
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -19,10 +19,10 @@ class CannotDo(Exception):
 
 
 def main(make) -> None:
-    """Run every setting of the job in the folder that the command line names."""
-    folder = Path(sys.argv[1])
-    scene, run, settings = pickle.loads((folder / "job").read_bytes())
-    with open(folder / "results", "wb") as file:
+    """Run every setting of the job that comes in, write each result as it is there."""
+    scene, run, settings = pickle.load(sys.stdin.buffer)
+    with open(os.dup(1), "wb") as out:
+        os.dup2(2, 1)  # what engines print is no result
         for setting in settings:
             try:
                 result = play(partial(make, scene, setting), *run)
@@ -30,8 +30,8 @@ def main(make) -> None:
                 result = {"reason": f"cannot represent the scene: {error}"}
             except Exception as error:
                 result = {"reason": f"{type(error).__name__}: {error}".splitlines()[0]}
-            pickle.dump(result, file)
-            file.flush()
+            pickle.dump(result, out)
+            out.flush()
 
 
 def play(make, fps: float, frames: int, stop: int | None, limit: float) -> dict:
@@ -43,16 +43,15 @@ def play(make, fps: float, frames: int, stop: int | None, limit: float) -> dict:
     begin = perf_counter()
     engine = make()
     states = [(engine.positions(), engine.velocities())]
-    startup = wall = 0.0
+    wall = 0.0
     for frame in range(1, frames + 1):
         if frame - 1 == stop:
             engine.halt()
         start = perf_counter()
         engine.step_frame()
+        wall += perf_counter() - start
         if frame == 1:
-            startup = perf_counter() - begin
-        else:
-            wall += perf_counter() - start
+            startup, wall = perf_counter() - begin, 0.0
         states.append((engine.positions(), engine.velocities()))
         rate = wall * fps / max(frame - 1, 1)
         if not np.isfinite(states[-1][0]).all():

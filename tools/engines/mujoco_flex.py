@@ -21,7 +21,7 @@ class Engine:
     def __init__(self, scene, setting: dict):
         """Lay out the model and its start."""
         self.substeps = setting["steps"]
-        moved = [_held_velocity(scene, body) for body in scene.bodies]
+        moved = [_held_velocity(scene, part) for part in scene.parts]
         self.model = m = mujoco.MjModel.from_xml_string(xml(scene, setting, moved))
         self.data = d = mujoco.MjData(m)
         self.loose = np.flatnonzero(~scene.fixed)
@@ -72,13 +72,13 @@ def xml(scene, setting: dict, moved: list[np.ndarray]) -> str:
         for n, h in scene.planes
     ]
     radius = setting["radius"] * scene.edge
-    for k, (body, v) in enumerate(zip(scene.bodies, moved, strict=True)):
-        held = np.flatnonzero(scene.fixed[body.part])
+    for k, (body, part, v) in enumerate(zip(scene.bodies, scene.parts, moved, strict=True)):
+        held = np.flatnonzero(scene.fixed[part])
         pin = f'<pin id="{" ".join(map(str, held))}"/>' if len(held) else ""
         parts.append(
             f'<body name="body{k}" gravcomp="{int(v.any())}">{RAILS if v.any() else ""}'
-            f'<flexcomp name="flex{k}" type="direct" dim="3" mass="{scene.mass[body.part].sum()}" '
-            f'radius="{radius}" point="{_row(scene.rest[body.part].ravel())}" '
+            f'<flexcomp name="flex{k}" type="direct" dim="3" mass="{scene.mass[part].sum()}" '
+            f'radius="{radius}" point="{_row(scene.rest[part].ravel())}" '
             f'element="{" ".join(map(str, body.tets.ravel()))}">'
             f'<elasticity young="{body.youngs_modulus}" poisson="{body.poisson_ratio}" '
             f'damping="{body.damping}"/><contact selfcollide="none" {touch}/>{pin}'
@@ -91,10 +91,10 @@ def xml(scene, setting: dict, moved: list[np.ndarray]) -> str:
     )
 
 
-def _held_velocity(scene, body) -> np.ndarray:
+def _held_velocity(scene, part: slice) -> np.ndarray:
     """The velocity of the held vertices of a body, zero where it has none [m/s]."""
-    held = scene.fixed[body.part]
-    return scene.v[body.part][held][0] if held.any() else np.zeros(3)
+    held = scene.fixed[part]
+    return scene.v[part][held][0] if held.any() else np.zeros(3)
 
 
 def _row(values) -> str:

@@ -39,14 +39,13 @@ def drive(v: wp.array[wp.vec3], dt: float, q: wp.array[wp.vec3]):
 
 def vbd(scene, setting: dict) -> "Engine":
     """The engine with vertex block descent."""
-    margin = setting["margin"] * scene.edge
     model = build(scene, 0.5, setting["contact"], POINT * scene.edge)
     solver = newton.solvers.SolverVBD(
         model,
         iterations=setting["iterations"],
         particle_enable_self_contact=len(scene.bodies) > 1,
-        particle_self_contact_margin=margin,
-        particle_self_contact_gap=margin,
+        particle_self_contact_margin=setting["margin"] * scene.edge,
+        particle_self_contact_gap=setting["margin"] * scene.edge,
         particle_enable_tile_solve=False,
     )
     return Engine(scene, setting, model, solver)
@@ -58,12 +57,8 @@ def xpbd(scene, setting: dict) -> "Engine":
         raise CannotDo("its tets have no forces where the second Lame parameter is zero")
     radius = (POINT if len(scene.bodies) == 1 else setting["radius"]) * scene.edge
     model = build(scene, 1.0, 1.0, radius)
-    solver = newton.solvers.SolverXPBD(
-        model,
-        iterations=setting["iterations"],
-        soft_body_relaxation=setting["relaxation"],
-        soft_contact_relaxation=setting["relaxation"],
-    )
+    relaxation = {f"soft_{part}_relaxation": setting["relaxation"] for part in ("body", "contact")}
+    solver = newton.solvers.SolverXPBD(model, iterations=setting["iterations"], **relaxation)
     return Engine(scene, setting, model, solver)
 
 
@@ -74,20 +69,18 @@ def build(scene, damping: float, contact: float, radius: float) -> newton.Model:
     edge of the finest body; the radius [m] is that of the particles.
     """
     builder = newton.ModelBuilder(gravity=scene.gravity)
-    for body in scene.bodies:
+    place = {"pos": wp.vec3(), "rot": wp.quat_identity(), "scale": 1.0, "vel": wp.vec3()}
+    for body, part in zip(scene.bodies, scene.parts, strict=True):
         mu, lam = body.lame
         builder.add_soft_mesh(
-            pos=wp.vec3(),
-            rot=wp.quat_identity(),
-            scale=1.0,
-            vel=wp.vec3(),
-            vertices=[wp.vec3(*p) for p in scene.rest[body.part].tolist()],
+            vertices=[wp.vec3(*p) for p in scene.rest[part].tolist()],
             indices=body.tets.ravel().tolist(),
             density=body.density,
             k_mu=mu,
             k_lambda=lam,
             k_damp=damping * body.damping * mu,
             particle_radius=radius,
+            **place,
         )
     builder.particle_mass = np.where(scene.fixed, 0.0, scene.mass).tolist()
     stiffness = contact * min(body.youngs_modulus for body in scene.bodies) * scene.edge

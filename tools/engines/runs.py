@@ -1,14 +1,13 @@
 """Run a task with many methods, one after the other: our own, then those of engines outside.
 
 These get plain arrays and hand back positions. The adapter of an engine, a file beside this one,
-runs in a process of its own, under an interpreter that may have other packages. One process takes
-all settings of a task; each result is written as it comes, so that a process which dies takes none
-with it.
+runs all settings of a task in a process of its own, under an interpreter that may have other
+packages. Each result is written as it comes: a process which dies takes none with it.
 """
 
+import io
 import pickle
 import subprocess
-import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -83,43 +82,41 @@ def outside(
 ) -> Iterator[Motion]:
     """The motion of every setting in turn."""
     adapter, law = ENGINES[engine]
-    with tempfile.TemporaryDirectory() as folder:
-        results = Path(folder) / "results"
-        results.touch()
-        job = plain(task), (task.fps, task.frames, task.stop, limit), settings
-        (Path(folder) / "job").write_bytes(pickle.dumps(job))
-        command = [python, str(Path(__file__).with_name(adapter)), folder, engine]
-        timeout = GRACE + limit * len(settings)
+    command = [python, str(Path(__file__).with_name(adapter)), engine]
+    job = pickle.dumps((plain(task), (task.fps, task.frames, task.stop, limit), settings))
+    time = GRACE + limit * len(settings)
+    try:
+        done = subprocess.run(command, input=job, capture_output=True, timeout=time)
+        found, said = done.stdout, done.stderr.decode()
+        reason = said.strip().rpartition("\n")[2] or f"exit code {done.returncode}"
+    except subprocess.TimeoutExpired as late:
+        found, reason = late.stdout or b"", "too slow: the process was stopped"
+    results = io.BytesIO(found)
+    for _ in settings:
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=timeout)
-            reason = done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode}"
-        except subprocess.TimeoutExpired:
-            reason = "too slow: the process was stopped"
-        with open(results, "rb") as file:
-            for _ in settings:
-                try:
-                    yield Motion(law=law, **pickle.load(file))
-                except (EOFError, pickle.UnpicklingError):
-                    yield Motion(reason=reason)
+            yield Motion(law=law, **pickle.load(results))
+        except (EOFError, pickle.UnpicklingError):
+            yield Motion(reason=reason)
 
 
 def plain(task: Task) -> SimpleNamespace:
     """The scene of a task as arrays, numbered through all bodies."""
     scene = task.scene()
-    whole = Numbered(scene)
-    found = SimpleNamespace(fps=task.fps, gravity=scene.gravity, friction=scene.friction, bodies=[])
-    found.planes = [(n.tolist(), h) for n, h in scene.planes]
-    found.rest, found.x = whole.rest, task.start(scene)  # (n, 3) [m]: as placed, at the start
-    found.v = np.concatenate([body.v for body in scene.bodies])  # (n, 3) [m/s]
-    found.fixed = np.concatenate([body.fixed for body in scene.bodies])
-    found.mass = whole.mass  # (n,) [kg]
-    found.edge = np.inf  # mean one of the surface of the finest body [m]
-    for body, part in zip(scene.bodies, whole.parts, strict=True):
-        own = asdict(body.material) | {"lame": body.material.lame(), "tets": body.mesh.tets}
-        found.bodies.append(SimpleNamespace(part=part, **own))
-        sides = body.x[body.mesh.surface] - body.x[np.roll(body.mesh.surface, 1, axis=1)]
-        found.edge = min(found.edge, float(np.linalg.norm(sides, axis=2).mean()))
-    return found
+    faces = [(body.x, body.mesh.surface) for body in scene.bodies]
+    edges = [np.linalg.norm(x[f] - x[np.roll(f, 1, axis=1)], axis=2).mean() for x, f in faces]
+    return SimpleNamespace(
+        **vars(Numbered(scene)),
+        x=task.start(scene),  # (n, 3) [m]
+        edge=float(min(edges)),  # mean one of the surface of the finest body [m]
+        bodies=[
+            SimpleNamespace(lame=b.material.lame(), tets=b.mesh.tets, **asdict(b.material))
+            for b in scene.bodies
+        ],
+        planes=[(n.tolist(), h) for n, h in scene.planes],
+        gravity=scene.gravity,
+        friction=scene.friction,
+        fps=task.fps,
+    )
 
 
 def versions(python: str) -> str:

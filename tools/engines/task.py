@@ -52,6 +52,8 @@ class Numbered:
         starts = np.cumsum([0, *(len(b.x) for b in bodies)]).tolist()
         self.parts = [slice(*ends) for ends in pairwise(starts)]  # vertices of each body
         self.rest = placed(scene)
+        self.v = np.concatenate([b.v for b in bodies])  # (n, 3) [m/s], at the start
+        self.fixed = np.concatenate([b.fixed for b in bodies])
         self.tets = np.concatenate([b.mesh.tets + k for b, k in zip(bodies, starts, strict=False)])
         share = [np.repeat(0.25 * b.material.density * b.mesh.volumes, 4) for b in bodies]
         self.mass = np.bincount(self.tets.ravel(), np.concatenate(share))  # (n,) [kg]

@@ -14,7 +14,6 @@ pictures of a table again, beside it.
 
 import sys
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -28,12 +27,7 @@ from engines.task import Failed, Task
 from measure import machine
 from measure.run import command_line, count, one_of
 
-TASKS = {
-    "A1": closed_forms.springs,
-    "A3": closed_forms.pressed,
-    "A6": closed_forms.free,
-    "A7m": closed_forms.ladder,
-} | {name: partial(scenes.scene, name) for name in scenes.PRESSED}
+TASKS = *closed_forms.TASKS, *scenes.PRESSED
 LIMIT, QUICK_LIMIT = 12.0, 6.0  # wall seconds of one run
 REPEATS = 3  # of everything, in turn; times are medians
 FEW = 5  # settings of each engine outside in the quick run
@@ -47,13 +41,14 @@ def main() -> int:
     """Run, draw, write."""
     parser = command_line(__doc__)
     parser.add_argument("tasks", nargs="*", type=one_of(TASKS), metavar="task", help="or all")
-    parser.add_argument("--quick", action="store_true", help="fewer settings, each once")
+    parser.add_argument("--quick", action="store_true", help="fewer settings, each once, short")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "pareto")
     parser.add_argument("--python", default=sys.executable, help="interpreter with the engines")
     parser.add_argument("--repeats", type=count, help=f"{REPEATS}, quick: 1")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="a table to draw again")
     args = parser.parse_args()
-    chosen = [TASKS[name](args.quick) for name in args.tasks or TASKS]
+    tasks = closed_forms.TASKS | {n: scenes.scene(n, args.quick) for n in scenes.PRESSED}
+    chosen = [tasks[name] for name in args.tasks or TASKS]
     titles = {panel.name: panel.title for _, panels in chosen for panel in panels}
     if args.draw:
         draw(args.draw.parent, titles, points.read(args.draw))

@@ -16,15 +16,15 @@ from verification.columns import Column, Pile
 from verification.setup import G, on_face
 
 import warp_contact as wc
-from chart.panel import STEPS, Elastic, Panel, Shown, late, sound, squeeze
+from chart.panel import STEPS, Elastic, Panel, late, sound, squeeze
 
 ZETA = 0.35  # damping ratio of the slowest mode, where bodies come to rest
 
 
-def lowered(scene: wc.Scene, v: float) -> wc.Scene:
-    """The scene, with the held vertices of its last body moving down at v [m/s]."""
+def lower(scene: wc.Scene, way: float, frames: int, fps: float) -> wc.Scene:
+    """The scene, with the held vertices of its last body on a way down [m] of so many frames."""
     body = scene.bodies[-1]
-    body.v[body.fixed] = 0.0, 0.0, -v
+    body.v[body.fixed] = 0.0, 0.0, -way * fps / frames
     return scene
 
 
@@ -32,25 +32,18 @@ def lowered(scene: wc.Scene, v: float) -> wc.Scene:
 # the engine's own law carry the same pressure.
 
 SOFT, STIFF, OVERLAP, SPACE = 1e5, 1e6, 0.1, 0.02  # [Pa], [Pa], [m], [m]
-PUSH, SETTLE, PUSH_FPS = 18, 60, 60  # frames, frames, [1/s]
 SPEED = 10.0  # of the waves in both columns [m/s]
-CELLS, QUICK_CELLS = ((3, 3, 6), (4, 4, 6)), ((2, 2, 4), (3, 3, 4))
+PUSH, PUSH_FPS = 18, 60  # frames, [1/s]
 
 
-def springs(quick: bool) -> Shown:
-    """A1."""
+def springs() -> wc.Scene:
+    """Both columns."""
     columns = [
         Column(young, 1.0, young / SPEED**2, cells, damping=2.0 * ZETA / (0.5 * np.pi * SPEED))
-        for young, cells in zip((SOFT, STIFF), QUICK_CELLS if quick else CELLS, strict=True)
+        for young, cells in ((SOFT, (3, 3, 6)), (STIFF, (4, 4, 6)))
     ]
-
-    def build() -> wc.Scene:
-        scene = Pile(columns, SPACE, clamped=True).build(wc.NeoHookean)
-        return lowered(scene, (OVERLAP + SPACE) * PUSH_FPS / PUSH)
-
-    title = "A1 series springs 1:10\nplace of the surface [of the overlap]"
-    task = Task(build, PUSH_FPS, PUSH + SETTLE, SOFT / 16.0, stop=PUSH)
-    return task, [Panel("A1", title, place)]
+    scene = Pile(columns, SPACE, clamped=True).build(wc.NeoHookean)
+    return lower(scene, OVERLAP + SPACE, PUSH, PUSH_FPS)
 
 
 def place(task: Task, motion: Motion) -> float:
@@ -74,30 +67,21 @@ def meeting(law: str) -> float:
 
 # A3: the cap of a sphere pressed onto a plane by a given depth.
 
-FINE, QUICK_FINE = 2, 1  # elements across the radius of contact
-HERTZ_PUSH, HERTZ_SETTLE, HERTZ_FPS = 10, 15, 1000  # frames, frames, [1/s]
-HERTZ_SPACE = 1e-4  # at the start [m]
+FINE = 2  # elements across the radius of contact
+PRESS, PRESS_FPS = 10, 1000  # frames, [1/s]
+SLIT = 1e-4  # at the start [m]
 
 
-def pressed(quick: bool) -> Shown:
-    """A3."""
-    n = QUICK_FINE if quick else FINE
-    depth = hertz.CONTACT**2 / hertz.RADIUS
-
-    def build() -> wc.Scene:
-        scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
-        scene.add_plane((0.0, 0.0, 1.0), 0.0)
-        mesh = hertz.cap(hertz.RADIUS, hertz.CONTACT / n, hertz.RINGS[n])
-        omega = 0.5 * np.pi * hertz.pressure_wave(hertz.YOUNG) / hertz.HEIGHT
-        rubber = wc.NeoHookean(hertz.YOUNG, hertz.POISSON, hertz.DENSITY, 2.0 * ZETA / omega)
-        held = mesh.vertices[:, 2] > 0.999 * hertz.HEIGHT
-        scene.add_body(mesh, rubber, (0.0, 0.0, HERTZ_SPACE), fixed=held)
-        return lowered(scene, (depth + HERTZ_SPACE) * HERTZ_FPS / HERTZ_PUSH)
-
-    stiffness = hertz.YOUNG * hertz.CONTACT / n
-    title = f"A3 Hertz, {n} element(s) across\npressure at the middle [of exact]"
-    task = Task(build, HERTZ_FPS, HERTZ_PUSH + HERTZ_SETTLE, stiffness, stop=HERTZ_PUSH)
-    return task, [Panel("A3", title, peak)]
+def ball() -> wc.Scene:
+    """The cap above the plane."""
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    mesh = hertz.cap(hertz.RADIUS, hertz.CONTACT / FINE, hertz.RINGS[FINE])
+    omega = 0.5 * np.pi * hertz.pressure_wave(hertz.YOUNG) / hertz.HEIGHT
+    rubber = wc.NeoHookean(hertz.YOUNG, hertz.POISSON, hertz.DENSITY, 2.0 * ZETA / omega)
+    held = mesh.vertices[:, 2] > 0.999 * hertz.HEIGHT
+    scene.add_body(mesh, rubber, (0.0, 0.0, SLIT), fixed=held)
+    return lower(scene, hertz.CONTACT**2 / hertz.RADIUS + SLIT, PRESS, PRESS_FPS)
 
 
 def peak(task: Task, motion: Motion) -> float:
@@ -122,19 +106,9 @@ def peak(task: Task, motion: Motion) -> float:
 # A6: two undamped free blocks, the second ten times as dense, meet head-on.
 
 
-def free(_: bool) -> Shown:
-    """A6: momentum and energy; the quick run is the same."""
-    panels = [
-        Panel("A6p", "A6 free collision 1:10\nchange of momentum [of that at the start]", drift),
-        Panel("A6e", "A6 free collision 1:10\nenergy gained or lost [of that at the start]", work),
-    ]
-    build = partial(collision.thrown, (3, 5), "head-on", 10.0)
-    return Task(build, fps=240, frames=60, stiffness=500.0), panels
-
-
 def drift(task: Task, motion: Motion) -> float:
     """Largest change of momentum after any frame, of sum m |v| at the start."""
-    m = met(task, motion).mass
+    m = parted(task, motion).mass
     p = np.einsum("i,fij->fj", m, motion.v.astype(float))
     scale = m @ np.linalg.norm(motion.v[0], axis=1)
     return float(np.linalg.norm(p - p[0], axis=1).max() / scale)
@@ -145,13 +119,13 @@ def work(task: Task, motion: Motion) -> float:
 
     Undamped and without friction exact is none; a loss counts as well as a gain.
     """
-    solid = met(task, motion)
-    kinetic = 0.5 * (motion.v.astype(float) ** 2).sum(axis=2) @ solid.mass
-    energy = kinetic + [solid.energy(x) for x in motion.x]
+    solid = parted(task, motion)
+    energy = 0.5 * (motion.v.astype(float) ** 2).sum(axis=2) @ solid.mass
+    energy += [solid.energy(x) for x in motion.x]
     return abs(float(energy[late(task, 1.0 / 3.0)].mean() / energy[0]) - 1.0)
 
 
-def met(task: Task, motion: Motion) -> Elastic:
+def parted(task: Task, motion: Motion) -> Elastic:
     """As ``sound``; ``Failed`` as well unless the blocks have met and parted."""
     solid = sound(task, motion)
     first, second = (motion.v[-1, part, 2].mean() for part in solid.parts)
@@ -164,22 +138,16 @@ def met(task: Task, motion: Motion) -> Elastic:
 # and their damping takes 1.25 s until less than 0.01 % of the weight is left of that error.
 
 RATIO = 100.0
-LADDER_ZETA = 0.1  # a small part of the rate at which the light cube alone would be damped
+HEAVY = RATIO * weight.DENSITY  # [kg/m^3]
+STIFFNESS = 20.0 * HEAVY * G * weight.EDGE  # 5 % of strain [Pa]
+OMEGA = np.sqrt(STIFFNESS / HEAVY) / weight.EDGE
+# The damping ratio is a small part of the rate at which the light cube alone would be damped.
+CUBES = weight.cubes(RATIO, STIFFNESS, 2.0 * 0.1 / OMEGA)
 
 
-def ladder(_: bool) -> Shown:
-    """A7m; the quick run is the same."""
-    young = 20.0 * RATIO * weight.DENSITY * G * weight.EDGE  # 5 % of strain
-    omega = np.sqrt(young / (RATIO * weight.DENSITY)) / weight.EDGE
-    pile = weight.cubes(RATIO, young, 2.0 * LADDER_ZETA / omega)
-
-    def start(scene: wc.Scene) -> np.ndarray:
-        return np.concatenate(pile.static(scene))
-
-    build, stiffness = partial(pile.build, wc.NeoHookean), 0.1 * young * weight.EDGE
-    task = Task(build, fps=240, frames=360, stiffness=stiffness, start=start)
-    title = f"A7m heavy on light 1:{RATIO:g}\nforce and its ripple [of the weight]"
-    return task, [Panel("A7m", title, carried)]
+def resting(scene: wc.Scene) -> np.ndarray:
+    """Where linear bars rest [m]."""
+    return np.concatenate(CUBES.static(scene))
 
 
 def carried(task: Task, motion: Motion) -> float:
@@ -193,3 +161,33 @@ def carried(task: Task, motion: Motion) -> float:
     own, load = solid.mass[light][~base].sum() * G, solid.mass[heavy].sum() * G
     forces = [-solid.forces(x)[light][base, 2].sum() - own for x in motion.x[late(task)]]
     return rms(np.array(forces) / load - 1.0)
+
+
+COLLISION = "A6 free collision 1:10\n{} [of that at the start]"
+TASKS = {  # and their panels
+    "A1": (
+        Task(springs, PUSH_FPS, PUSH + 60, SOFT / 16.0, stop=PUSH),
+        [Panel("A1", "A1 series springs 1:10\nplace of the surface [of the overlap]", place)],
+    ),
+    "A3": (
+        Task(ball, PRESS_FPS, PRESS + 15, hertz.YOUNG * hertz.CONTACT / FINE, stop=PRESS),
+        [Panel("A3", "A3 Hertz, 2 element(s) across\npressure at the middle [of exact]", peak)],
+    ),
+    "A6": (
+        Task(partial(collision.thrown, (3, 5), "head-on", 10.0), 240, 60, 500.0),
+        [
+            Panel("A6p", COLLISION.format("change of momentum"), drift),
+            Panel("A6e", COLLISION.format("energy gained or lost"), work),
+        ],
+    ),
+    "A7m": (
+        Task(
+            partial(CUBES.build, wc.NeoHookean),
+            240,
+            360,
+            0.1 * STIFFNESS * weight.EDGE,
+            start=resting,
+        ),
+        [Panel("A7m", "A7m heavy on light 1:100\nforce and its ripple [of the weight]", carried)],
+    ),
+}

@@ -43,7 +43,7 @@ def test_the_impulses_alone_move_no_surface(monkeypatch):
         return launch(kernel, *args, **kwargs)
 
     monkeypatch.setattr(wp, "launch", noted)
-    found = {setting.method: setting for setting in ours.settings(quick=True)[::-1]}
+    found = {setting.method: setting for setting in ours.QUICK[::-1]}
     ours.run(blocks(), found["impulses alone"], None, 60.0)
     assert "impulse" in launched and launched.isdisjoint({"closure", "search"})
     ours.run(blocks(), found["default"], None, 60.0)
@@ -79,7 +79,7 @@ def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
     from engines import ours, runs
     from engines.task import Motion
 
-    own = ours.settings(quick=False)
+    own = list(ours.ALL)
     own.append(ours.Own("broken", factor=1))
     own.append(ours.Own("broken", factor=2))
     alike = dict.fromkeys((s.method, s.times) for s in own)
@@ -143,13 +143,15 @@ def test_the_front_is_what_no_other_point_beats_in_both():
 
 
 def test_a_failure_is_behind_everything_and_on_no_front():
-    from chart.points import dominates, fastest_below, front
+    from chart.points import dominates, front, report
 
     *fine, broken, absent = points()
     assert all(dominates(p, broken) and not dominates(broken, p) for p in fine)
     assert front([broken, absent]) == []
-    assert fastest_below([broken, *fine], 1e-2).method == "between"
-    assert fastest_below([broken], 1.0) is None
+    assert "error at most 0.01: between 3 s, exact 10 s\n" in report(
+        "", {"A": ""}, [broken, *fine[:3]]
+    )
+    assert "error at most 0.05: none\n" in report("", {"A": ""}, [broken])
 
 
 def test_the_table_keeps_every_point(tmp_path):

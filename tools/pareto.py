@@ -53,14 +53,13 @@ def main() -> int:
     if args.draw:
         draw(args.draw.parent, titles, points.read(args.draw))
         return 0
-    few = FEW if args.quick else None
+    own, few, limit = (ours.QUICK, FEW, QUICK_LIMIT) if args.quick else (ours.ALL, None, LIMIT)
     others = {engine: rows[:few] for engine, (_, rows) in SWEEPS.items()}
-    limit = QUICK_LIMIT if args.quick else LIMIT
     begin, rounds, outside = perf_counter(), [], versions(args.python)
     for _ in range(args.repeats or (1 if args.quick else REPEATS)):
         rounds.append([])
         for task, panels in chosen:
-            for run in runs(task, ours.settings(args.quick), others, args.python, limit):
+            for run in runs(task, own, others, args.python, limit):
                 rounds[-1] += judge(task, panels, run)
         # After every round: a long run leaves what it has.
         found = choose([middle(same) for same in zip(*rounds, strict=True)])

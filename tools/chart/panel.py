@@ -21,8 +21,6 @@ from verification.setup import gradients
 import warp_contact as wc
 
 STEPS = 30  # of a fixed-point iteration from small strain; each gains about half a digit at 10 %
-
-
 LAST = 0.1  # part of the frames at the end over which a state of rest is averaged
 
 

@@ -2,15 +2,14 @@
 
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
+from matplotlib import rcParams
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import blended_transform_factory as blend
 
 from chart.points import Point, front
 
+rcParams["axes.labelsize"] = 12
 STYLES = {  # method: (colour, marker, what a newcomer is told)
     "default": ("#c8401e", "o", "warp_contact, default"),
     "impulses alone": ("#8a5a9e", "p", "its impulses alone"),
@@ -37,7 +36,8 @@ FAINT = 0.25  # opacity of points that their own method beats
 def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
     """A picture of panels in two columns; ``titles``, and what the error is, by their names."""
     rows = -(-len(titles) // 2)
-    figure, axes = plt.subplots(rows, 2, figsize=(14.0, 5.0 * rows), layout="constrained")
+    figure = Figure(figsize=(14.0, 5.0 * rows), layout="constrained")
+    axes = figure.subplots(rows, 2)
     for ax in axes.flat[len(titles) :]:
         ax.set_visible(False)
     for ax, (name, title) in zip(axes.flat, titles.items(), strict=False):
@@ -55,17 +55,14 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
     figure.suptitle(TITLE, fontsize=15)
     figure.legend(handles=handles, loc="outside lower center", ncols=6, fontsize=12, frameon=False)
     figure.savefig(path, dpi=100)
-    plt.close(figure)
 
 
 def panel(ax, title: str, points: list[Point]) -> None:
     """Points, the front of each method, that of all, and each failure on a rail at the top."""
     title, _, error = title.partition("\n")
-    ax.set(xscale="log", yscale="log")
+    ax.set(xscale="log", yscale="log", xlabel="wall seconds per simulated second", ylabel=error)
     ax.set_title(title, fontsize=15, pad=26)
-    ax.set_xlabel("wall seconds per simulated second", fontsize=12)
-    ax.set_ylabel(error, fontsize=12)
-    ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
     ax.tick_params(labelsize=11)
     ax.grid(True, which="major", color="0.9")

@@ -7,9 +7,11 @@ from typing import NamedTuple
 
 HEAD = "panel", "method", "setting", "wall s per simulated s", "error", "outcome"
 HEAD += "start-up s", "shown"
-LEVELS = 0.05, 0.01, 0.001  # errors at which times are compared
-TIMES = 1.0, 10.0  # wall seconds per simulated second at which errors are compared
 BY_WALL, BY_ERROR = attrgetter("wall"), attrgetter("error")
+COMPARED = (  # times of all methods at equal errors, errors at equal times
+    ("error at most {:g}", (0.05, 0.01, 0.001), BY_ERROR, BY_WALL, "{p.method} {p.wall:.3g} s"),
+    ("within {:g} s per s", (1.0, 10.0), BY_WALL, BY_ERROR, "{p.method} {p.error:.2g}"),
+)
 
 
 class Point(NamedTuple):
@@ -55,12 +57,6 @@ def front(points: list[Point]) -> list[Point]:
     return sorted((p for p in fine if not any(dominates(q, p) for q in fine)), key=BY_WALL)
 
 
-def fastest_below(points: list[Point], error: float) -> Point | None:
-    """The quickest point with at most this error."""
-    fine = (p for p in points if p.error is not None and p.error <= error)
-    return min(fine, key=BY_WALL, default=None)
-
-
 def report(head: str, titles: dict[str, str], points: list[Point]) -> str:
     """All panels, after ``head``: machine, versions, date."""
     parts = [head]
@@ -84,15 +80,12 @@ def panel(points: list[Point]) -> list[str]:
         before = [m for m in of if any(dominates(p, q) for p in of[m] for q in own)]
         said = ", ".join(before) or "none"
         lines.append(f"  faster and no less accurate than a point of the default's front: {said}")
-    for level in LEVELS:
-        first = sorted(filter(None, (fastest_below(of[m], level) for m in of)), key=BY_WALL)
-        said = ", ".join(f"{p.method} {p.wall:.3g} s" for p in first) or "none"
-        lines.append(f"  error at most {level:g}: {said}")
-    for time in TIMES:
-        within = [[p for p in mine if p.wall <= time] for mine in fine.values()]
-        first = sorted((min(w, key=BY_ERROR) for w in within if w), key=BY_ERROR)
-        said = ", ".join(f"{p.method} {p.error:.2g}" for p in first) or "none"
-        lines.append(f"  within {time:g} s per s: {said}")
+    for head, limits, limited, best, cell in COMPARED:
+        for limit in limits:
+            within = [[p for p in mine if limited(p) <= limit] for mine in fine.values()]
+            first = sorted((min(w, key=best) for w in within if w), key=best)
+            said = ", ".join(cell.format(p=p) for p in first) or "none"
+            lines.append(f"  {head.format(limit)}: {said}")
     for method, mine in of.items():
         why = [p.outcome for p in mine if p.error is None]
         if why:

@@ -10,9 +10,6 @@ from engines.job import play
 from engines.task import Motion, Task
 from warp_contact.data.switches import without
 
-STIFFNESSES = 0.01, 0.1, 1.0, 10.0, 100.0  # of that of the task
-FACTORS = 1, 2, 4
-
 
 class Own(NamedTuple):
     """A method at one setting."""
@@ -39,20 +36,20 @@ class Own(NamedTuple):
 
 
 DEFAULT = Own("default", 4)
-
-
-def settings(quick: bool) -> list[Own]:
-    """Of ``ContactSurface()``, its impulses, its literal search, and other forces."""
-    out = [DEFAULT._replace(factor=f) for f in FACTORS]
-    out += [Own("default", n) for n in (2, 8)]
-    out += [Own(name, factor=f) for name in ("impulses alone", "predicted") for f in FACTORS]
-    out += [Own("literal", n) for n in (4, 8, 16)]
-    out += [Own("penalty", times=k) for k in STIFFNESSES]
-    if not quick:
-        out += [Own("default", n, factor=f) for n in (2, 8, 16) for f in (2, 4)]
-        out += [Own("literal", n, factor=f) for n in (4, 8, 16) for f in (2, 4)]
-        out += [Own("penalty", times=k, factor=2) for k in STIFFNESSES]
-    return out
+STIFFNESSES = 0.01, 0.1, 1.0, 10.0, 100.0  # of that of the task
+QUICK = [
+    *(DEFAULT._replace(factor=f) for f in (1, 2, 4)),
+    *(Own("default", n) for n in (2, 8)),
+    *(Own(name, factor=f) for name in ("impulses alone", "predicted") for f in (1, 2, 4)),
+    *(Own("literal", n) for n in (4, 8, 16)),
+    *(Own("penalty", times=k) for k in STIFFNESSES),
+]
+ALL = [
+    *QUICK,
+    *(Own("default", n, factor=f) for n in (2, 8, 16) for f in (2, 4)),
+    *(Own("literal", n, factor=f) for n in (4, 8, 16) for f in (2, 4)),
+    *(Own("penalty", times=k, factor=2) for k in STIFFNESSES),
+]
 
 
 class Engine(wc.Simulation):

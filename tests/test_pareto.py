@@ -118,6 +118,25 @@ def test_a_run_that_failed_is_a_point_with_its_reason_in_every_panel():
     assert (second.error, second.outcome, second.startup) == (None, "bodies apart", 0.25)
 
 
+@pytest.mark.parametrize("law", ["neo-hookean", "st-venant"])
+def test_both_columns_carry_the_same_pressure_where_they_meet(law):
+    from chart.closed_forms import MEETING, OVERLAP, SOFT, STIFF
+    from chart.panel import response
+
+    def pressure(stretch: float, young: float) -> float:
+        side = 1.0
+        for _ in range(100):  # until the sides, of a Poisson ratio of 0, are free
+            _, p = response(np.diag([side, side, stretch]), 0.5 * young, 0.0, law)
+            side -= p[0, 0] / young
+        assert abs(p[0, 0]) < 1e-12 * young
+        return -p[2, 2]
+
+    soft = pressure(MEETING[law], SOFT)
+    assert soft == pytest.approx(pressure(2.0 - OVERLAP - MEETING[law], STIFF), rel=1e-12)
+    # Linear bars would; at 9 % of strain the laws are off by about as much.
+    assert soft == pytest.approx(SOFT * OVERLAP / 1.1, rel=0.15)
+
+
 def points():
     from chart.points import Point
 

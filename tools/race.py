@@ -1,6 +1,6 @@
 """Scenes of many contacts side by side with engines outside: time, overlap, inverted tets.
 
-    python tools/race.py [scene ...] [--quick] [--python PATH]
+    python tools/race.py [scene ...] [--python PATH]
 
 Every engine gets the same vertices, tets, masses and coefficient of damping and is judged from its
 positions, as in ``tools/pareto.py``; each runs once, so that no time is better than the machine is
@@ -28,7 +28,7 @@ import warp_contact as wc
 from warp_contact.scenes import load
 
 FPS = 60
-LIMIT, QUICK_LIMIT = 400.0, 20.0  # wall seconds of one run
+LIMIT = 400.0  # wall seconds of one run
 SETTINGS = {"Newton VBD": (1, 5), "Newton XPBD": (8, 4), "MuJoCo flex": (2, 5)}  # fast, plain
 COLUMNS = {"scene": 18, "engine": 13, "steps": 6, "s / s": 8, "overlap": 9, "at the end": 10}
 TABLE = Table(**COLUMNS, inverted=0)
@@ -57,16 +57,14 @@ def main() -> int:
     """Run, print, write."""
     parser = command_line(__doc__)
     parser.add_argument("scenes", nargs="*", type=one_of(RACES), metavar="scene", help="or all")
-    parser.add_argument("--quick", action="store_true", help="the fast settings, runs cut short")
     parser.add_argument("--python", default=sys.executable, help="interpreter with the engines")
     args = parser.parse_args()
     print(f"{machine.line('cpu')}; outside: {versions(args.python)}\n\n{TABLE.head()}", flush=True)
     for name in args.scenes or RACES:
         build, seconds, count = RACES[name]
         task = Task(build, FPS, round(seconds * FPS))
-        count, limit = (1, QUICK_LIMIT) if args.quick else (count, LIMIT)
         others = {e: [SWEEPS[e][1][k] for k in rows[:count]] for e, rows in SETTINGS.items()}
-        for engine, _, motion in runs(task, [DEFAULT], others, args.python, limit):
+        for engine, _, motion in runs(task, [DEFAULT], others, args.python, LIMIT):
             who = "warp_contact" if engine == DEFAULT.method else engine
             print(TABLE.line(name, who, *cells(task, motion)), flush=True)
     return 0

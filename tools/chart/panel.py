@@ -20,7 +20,6 @@ from verification.setup import gradients
 
 import warp_contact as wc
 
-STEPS = 30  # of a fixed-point iteration from small strain; each gains about half a digit at 10 %
 LAST = 0.1  # part of the frames at the end over which a state of rest is averaged
 
 
@@ -62,16 +61,6 @@ def response(f: np.ndarray, mu, lam, law: str) -> tuple[np.ndarray, np.ndarray]:
     cof = np.cross(np.roll(f, -1, axis=-1), np.roll(f, -2, axis=-1), axis=-2)
     density = mu * (trace - grown) + 0.5 * (lam + mu) * grown**2
     return density, mu * f + ((lam + mu) * grown - mu) * cof
-
-
-def squeeze(pressure: float, young: float, law: str) -> float:
-    """The stretch at which a bar with free sides and a Poisson ratio of 0 carries a pressure."""
-    side = stretch = 1.0
-    for _ in range(STEPS):
-        _, p = response(np.diag([side, side, stretch]), 0.5 * young, 0.0, law)
-        side -= p[0, 0] / young
-        stretch -= (p[2, 2] + pressure) / young
-    return stretch
 
 
 class Panel(NamedTuple):

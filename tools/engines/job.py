@@ -2,7 +2,7 @@
 
 An engine has those parts of a ``Simulation`` that ``play`` uses, and ``halt()`` for held vertices.
 The adapter of an engine outside is a file that calls ``main(make)`` with what makes one of a scene
-(``runs.plain``) and a setting, and raises ``CannotDo`` where it cannot represent the scene.
+(``runs.plain``) and a setting, or raises NotImplementedError where it cannot represent the scene.
 """
 
 import os
@@ -14,10 +14,6 @@ from time import perf_counter
 import numpy as np
 
 
-class CannotDo(Exception):
-    """The engine cannot represent the scene; the message says why."""
-
-
 def main(make) -> None:
     """Run every setting of the job that comes in, write each result as it is there."""
     scene, run, settings = pickle.load(sys.stdin.buffer)
@@ -26,7 +22,7 @@ def main(make) -> None:
         for setting in settings:
             try:
                 result = play(partial(make, scene, setting), *run)
-            except CannotDo as error:
+            except NotImplementedError as error:
                 result = {"reason": f"cannot represent the scene: {error}"}
             except Exception as error:
                 result = {"reason": f"{type(error).__name__}: {error}".splitlines()[0]}

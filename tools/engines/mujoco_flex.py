@@ -21,7 +21,8 @@ class Engine:
     def __init__(self, scene, setting: dict):
         """Lay out the model and its start."""
         self.substeps = setting["steps"]
-        moved = [_held_velocity(scene, part) for part in scene.parts]
+        held = np.where(scene.fixed[:, None], scene.v, 0.0)
+        moved = [held[part][np.abs(held[part]).sum(axis=1).argmax()] for part in scene.parts]
         self.model = m = mujoco.MjModel.from_xml_string(xml(scene, setting, moved))
         self.data = d = mujoco.MjData(m)
         self.loose = np.flatnonzero(~scene.fixed)
@@ -71,30 +72,23 @@ def xml(scene, setting: dict, moved: list[np.ndarray]) -> str:
         f'<geom type="plane" size="0 0 1" zaxis="{_row(n)}" pos="{_row(np.array(n) * h)}" {touch}/>'
         for n, h in scene.planes
     ]
-    radius = setting["radius"] * scene.edge
     for k, (body, part, v) in enumerate(zip(scene.bodies, scene.parts, moved, strict=True)):
         held = np.flatnonzero(scene.fixed[part])
-        pin = f'<pin id="{" ".join(map(str, held))}"/>' if len(held) else ""
         parts.append(
             f'<body name="body{k}" gravcomp="{int(v.any())}">{RAILS if v.any() else ""}'
             f'<flexcomp name="flex{k}" type="direct" dim="3" mass="{scene.mass[part].sum()}" '
-            f'radius="{radius}" point="{_row(scene.rest[part].ravel())}" '
-            f'element="{" ".join(map(str, body.tets.ravel()))}">'
-            f'<elasticity young="{body.youngs_modulus}" poisson="{body.poisson_ratio}" '
-            f'damping="{body.damping}"/><contact selfcollide="none" {touch}/>{pin}'
-            "</flexcomp></body>"
+            f'radius="{setting["radius"] * scene.edge}" point="{_row(scene.rest[part].ravel())}" '
+            f'element="{_row(body.tets.ravel())}"><elasticity young="{body.youngs_modulus}" '
+            f'poisson="{body.poisson_ratio}" damping="{body.damping}"/>'
+            f'<contact selfcollide="none" {touch}/>'
+            + (f'<pin id="{_row(held)}"/>' if len(held) else "")
+            + "</flexcomp></body>"
         )
     return (
         f'<mujoco><option timestep="{dt:.12g}" integrator="discrete" '
         f'gravity="{_row(scene.gravity)}" iterations="{setting["iterations"]}"/><size memory="1G"/>'
         f"<worldbody>{''.join(parts)}</worldbody></mujoco>"
     )
-
-
-def _held_velocity(scene, part: slice) -> np.ndarray:
-    """The velocity of the held vertices of a body, zero where it has none [m/s]."""
-    held = scene.fixed[part]
-    return scene.v[part][held][0] if held.any() else np.zeros(3)
 
 
 def _row(values) -> str:

@@ -23,7 +23,7 @@ import sys
 import newton
 import numpy as np
 import warp as wp
-from job import CannotDo, main
+from job import main
 
 wp.config.log_level = wp.LOG_WARNING
 
@@ -54,7 +54,7 @@ def vbd(scene, setting: dict) -> "Engine":
 def xpbd(scene, setting: dict) -> "Engine":
     """The engine with extended position-based dynamics."""
     if min(body.lame[1] for body in scene.bodies) <= 0.0:
-        raise CannotDo("its tets have no forces where the second Lame parameter is zero")
+        raise NotImplementedError("its tets have no forces where the second Lame parameter is zero")
     radius = (POINT if len(scene.bodies) == 1 else setting["radius"]) * scene.edge
     model = build(scene, 1.0, 1.0, radius)
     relaxation = {f"soft_{part}_relaxation": setting["relaxation"] for part in ("body", "contact")}

@@ -15,7 +15,7 @@ wp.set_module_options(OPTIONS)
 class Mesh:
     """The meshes of all bodies, and the half-spaces."""
 
-    edge: float  # shortest mean edge of a body [m]
+    shortest_edge: float  # shortest mean edge of a body [m]
     n_body: int  # a body m >= n_body is half-space m - n_body
     bvh: wp.uint64  # Bvh over the triangles, grouped by body
     tets: wp.array[wp.vec4i]  # (n_tet,)

@@ -33,7 +33,7 @@ def sum_chunks(
 def scan_chunks(
     # in
     chunk: int,  # values of a chunk
-    inclusive: bool,
+    own: int,  # 1 for inclusive sums, 0 for exclusive ones
     before: wp.array[int],  # (n_chunk,) sum of all chunks before each one
     # in, out
     value: wp.array[int],  # (n,)
@@ -41,10 +41,24 @@ def scan_chunks(
     """One thread per chunk: its running sums."""
     k = wp.tid()
     s = before[k]
-    for i in range(k * chunk, wp.min((k + 1) * chunk, value.shape[0])):
+    i = k * chunk
+    end = wp.min((k + 1) * chunk, value.shape[0])
+    while i + 4 <= end:  # four at a time: half of the time on a CPU
+        v0 = value[i]
+        v1 = value[i + 1]
+        v2 = value[i + 2]
+        v3 = value[i + 3]
+        s1 = s + v0
+        s2 = s1 + v1
+        s3 = s2 + v2
+        value[i] = s + own * v0
+        value[i + 1] = s1 + own * v1
+        value[i + 2] = s2 + own * v2
+        value[i + 3] = s3 + own * v3
+        s = s3 + v3
+        i += 4
+    while i < end:
         v = value[i]
-        if inclusive:
-            value[i] = s + v
-        else:
-            value[i] = s
+        value[i] = s + own * v
         s += v
+        i += 1

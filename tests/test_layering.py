@@ -15,6 +15,7 @@ SCENES = sorted((ROOT / "scenes").glob("*.py"))
 MAY = {  # room: those that it may import, beside itself
     "errors": set(),
     "progress": set(),
+    "exclusive": set(),
     "data": {"kernels"},
     "scene": {"kernels", "data"},
     "step": {"kernels", "data"},
@@ -22,7 +23,7 @@ MAY = {  # room: those that it may import, beside itself
     "measure": {"kernels", "data", "scene", "step"},
     "usd": set(),
     "picture": {"kernels", "usd"},
-    "simulation": {"data", "scene", "step", "frame", "measure", "errors", "progress"},
+    "simulation": {"data", "scene", "step", "frame", "measure", "errors", "progress", "exclusive"},
     "__init__": {"scene", "step", "measure", "usd", "simulation", "errors"},
     "command": {"__init__", "errors", "progress", "scene", "step", "simulation", "usd", "picture"},
     "__main__": {"command"},

@@ -13,14 +13,13 @@ the table: the broad and the narrow phase, the impulses, and eq. (1), which only
 search has to look.
 """
 
-import argparse
 import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
-import warp as wp
+from measure.run import command_line, one_of
 from parts.table import PARTS, Part
 
 from warp_contact import SimulationError
@@ -60,15 +59,9 @@ class Line:
 
 def main() -> int:
     """Print the table as it comes."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("parts", nargs="*", metavar="part", help=f"of {', '.join(PARTS)}; or all")
+    parser = command_line(__doc__)
+    parser.add_argument("parts", nargs="*", type=one_of(PARTS), metavar="part", help="or all")
     args = parser.parse_args()
-    unknown = set(args.parts) - set(PARTS)
-    if unknown:
-        parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(PARTS)}")
-    wp.config.log_level = wp.LOG_WARNING
     print("  ".join(c.ljust(w) for c, w in zip(COLUMNS, WIDTHS, strict=True)).rstrip())
     useless = []
     for key in args.parts or PARTS:

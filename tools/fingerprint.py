@@ -13,7 +13,6 @@ Kernels are compiled so that each product and each sum is rounded by itself. As 
 arrays lie in memory: the same formulas on the same numbers then round in another way.
 """
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -24,6 +23,7 @@ from unittest import mock
 
 import numpy as np
 import warp as wp
+from measure.run import command_line, one_of
 
 import warp_contact as wc
 from warp_contact.scenes import load
@@ -294,31 +294,23 @@ def kernels() -> set[str]:
 
 def main() -> int:
     """Print the hashes; compare them where asked to."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("runs", nargs="*", metavar="run", help=f"of {', '.join(RUNS)}; or all")
+    parser = command_line(__doc__)
+    parser.add_argument("runs", nargs="*", type=one_of(RUNS), metavar="run", help="or all")
     parser.add_argument("--out", metavar="FILE", help="write the hashes there too")
     parser.add_argument("--against", metavar="FILE", help="compare with the hashes of a file")
     parser.add_argument("--reach", action="store_true", help="name kernels that no run launched")
     parser.add_argument("--contracted", action="store_true", help="compile as simulations do")
     args = parser.parse_args()
-    unknown = set(args.runs) - set(RUNS)
-    if unknown:
-        parser.error(f"no run {', '.join(sorted(unknown))}; there are {', '.join(RUNS)}")
-    wp.config.log_level = wp.LOG_WARNING
     if not args.contracted:
         round_each_operation()
-    before = {}
-    if args.against:
-        lines = Path(args.against).read_text(encoding="utf-8").splitlines()
-        before = dict(line.split() for line in lines)
-    found, changed = {}, []
+    lines = Path(args.against).read_text(encoding="utf-8").splitlines() if args.against else []
+    before = dict(line.split() for line in lines)
+    found, changed = {}, 0
     with launched() as seen:
         for name, value in fingerprints(args.runs or list(RUNS)):
             found[name] = value
             differs = name in before and before[name] != value
-            changed += [name] * differs
+            changed += differs
             print(f"{name:20}{value}{'  was ' + before[name] if differs else ''}", flush=True)
     if args.out:
         text = "".join(f"{name} {value}\n" for name, value in found.items())
@@ -326,8 +318,8 @@ def main() -> int:
     if args.reach:
         print("not launched:", ", ".join(sorted(kernels() - seen)) or "none")
     if args.against:
-        print(f"{len(changed)} of {len(found)} changed")
-    return 1 if changed else 0
+        print(f"{changed} of {len(found)} changed")
+    return int(changed > 0)
 
 
 if __name__ == "__main__":

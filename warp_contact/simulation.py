@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import warp as wp
 
+from warp_contact.exclusive import exclusively
 from warp_contact.frame import checkpoint
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.stepper import Stepper
@@ -43,7 +44,7 @@ class Simulation:
         """Lay out a scene.
 
         Args:
-            scene: bodies and half-spaces
+            scene: bodies and half-spaces; nothing can be added to it or changed afterwards
             response: ``ContactSurface()`` by default
             fps: frames per second
             substeps: steps in each frame; None takes the stable step of the assembled system,
@@ -53,19 +54,21 @@ class Simulation:
                 settled pile costs next to nothing, at an accuracy that ``frame/sleeping.py`` states
 
         Raises:
-            ValueError: for an empty scene, an unknown device, fps or substeps that are not positive
+            ValueError: for an empty scene, an unknown device or response, fps or substeps that are
+                not positive
         """
         if not (math.isfinite(fps) and fps > 0.0):
             raise ValueError(f"fps {fps} is not positive")
         if substeps is not None and (int(substeps) != substeps or substeps < 1):
             raise ValueError(f"substeps {substeps} is not a positive count")
         self.scene = scene
-        self.response = ContactSurface() if response is None else response
+        self.response = _checked(ContactSurface() if response is None else response)
         self.fps = fps
         self.frame = 0
         self.device = _device(device)
-        with wp.ScopedDevice(self.device):
+        with exclusively(self.device):
             self.model, self.state = assemble(scene)
+            scene.freeze()
             load_kernels(self.model, self.device)
             settings = self.response, fps, substeps, sleeping
             self._stepper = Stepper(self.model, self.state, *settings)
@@ -105,19 +108,19 @@ class Simulation:
         Raises:
             SimulationError: as ``frames``
         """
-        with wp.ScopedDevice(self.device):
+        with exclusively(self.device):
             self._stepper.step(self.frame + 1)
         self.frame += 1
 
-    def positions(self, body: Body | int | None = None) -> np.ndarray:
+    def positions(self, body: Body | int | str | None = None) -> np.ndarray:
         """Copy of the positions [m] of one body or of all, shape (n, 3)."""
         return self.state.x.numpy()[self._range(body)].copy()
 
-    def velocities(self, body: Body | int | None = None) -> np.ndarray:
+    def velocities(self, body: Body | int | str | None = None) -> np.ndarray:
         """Copy of the velocities [m/s] of one body or of all, shape (n, 3)."""
         return self.state.v.numpy()[self._range(body)].copy()
 
-    def set_positions(self, body: Body | int | None, positions, vertices=None) -> None:
+    def set_positions(self, body: Body | int | str | None, positions, vertices=None) -> None:
         """Put vertices elsewhere between frames, as at the start of an episode.
 
         This is no motion: nothing on the way is touched or counted, and velocities stay. Overlaps
@@ -139,14 +142,14 @@ class Simulation:
         part[chosen] = positions
         if not np.isfinite(part).all():
             raise ValueError(f"{of} are not finite")
-        with wp.ScopedDevice(self.device):
+        with exclusively(self.device):
             self._meter.tunnelling.follow(self.state.x)
             self.state.x.assign(x)
             own = self.model.vert_body.numpy()[self._range(body)]
             self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
             self._stepper.look_anew()
 
-    def set_velocity(self, body: Body | int, velocity, vertices=None) -> None:
+    def set_velocity(self, body: Body | int | str, velocity, vertices=None) -> None:
         """Set velocities [m/s] between frames; fixed vertices keep theirs from then on.
 
         Args:
@@ -171,7 +174,7 @@ class Simulation:
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""
-        with wp.ScopedDevice(self.device):
+        with exclusively(self.device):
             duration = 1.0 / self.fps if self.frame else 0.0
             dt = duration / max(self.substeps, 1)
             return self._meter.measure(self.state, self._stepper.work, duration, dt)
@@ -192,7 +195,7 @@ class Simulation:
         The scene is not in it: build it anew, make a ``Simulation`` of it with the same settings,
         and ``load`` the file. Velocities given to fixed vertices are part of it.
         """
-        with wp.ScopedDevice(self.device):
+        with exclusively(self.device):
             values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
             values |= {"frame": np.array(self.frame)} | self._stepper.values()
             values |= {f"meter.{k}": value for k, value in self._meter.tunnelling.memory().items()}
@@ -206,7 +209,7 @@ class Simulation:
             ValueError: it is no checkpoint, or one of another scene or other settings
         """
         values = checkpoint.read(path, self._fingerprint())
-        with wp.ScopedDevice(self.device):
+        with exclusively(self.device):
             self.state.x.assign(values["x"])
             self.state.v.assign(values["v"])
             self._stepper.restore(values)
@@ -219,14 +222,19 @@ class Simulation:
         settings = self.response, self.fps, self._stepper.wanted, sleeping
         return checkpoint.fingerprint(self.model, *settings)
 
-    def _range(self, body: Body | int | None) -> slice:
+    def _range(self, body: Body | int | str | None) -> slice:
         if body is None:
             return slice(None)
         index = self._index(body)
         first, last = self.model.body_vert.numpy()[index : index + 2].tolist()
         return slice(first, last)
 
-    def _index(self, body: Body | int) -> int:
+    def _index(self, body: Body | int | str) -> int:
+        if isinstance(body, str):
+            if body not in self.model.labels:
+                known = ", ".join(self.model.labels)
+                raise ValueError(f"there is no body '{body}': the scene has {known}")
+            body = self.model.labels.index(body)
         index = body.index if isinstance(body, Body) else int(body)
         if not 0 <= index < self.model.n_body:
             raise ValueError(f"there is no body {index}: the scene has {self.model.n_body}")
@@ -234,7 +242,7 @@ class Simulation:
             raise ValueError(f"body '{body.label}' is of another scene")
         return index
 
-    def _label(self, body: Body | int) -> str:
+    def _label(self, body: Body | int | str) -> str:
         return self.model.labels[self._index(body)]
 
     def _choose(self, values: np.ndarray, body, vertices) -> tuple[np.ndarray, np.ndarray]:
@@ -244,6 +252,13 @@ class Simulation:
         name = f"vertices of {of}"
         chosen = np.arange(len(part)) if vertices is None else vertex_ids(vertices, len(part), name)
         return part, chosen
+
+
+def _checked(response) -> ContactSurface | Penalty | PredictedForce:
+    if isinstance(response, ContactSurface | Penalty | PredictedForce):
+        return response
+    known = "wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce()"
+    raise ValueError(f"response {response!r} is none of {known}")
 
 
 def _device(name: str | None) -> wp.Device:

@@ -88,9 +88,9 @@ def visit_edges(
         for k in range(of.n_near[m]):
             reach = skin[m] + skin[of.other[m, k]]
             if reaches(own, of.slab[m, k]):
-                other = of.part[m, k]
-                if boxes_meet(own.lo, own.hi, other.tri_lower, other.tri_upper):
-                    for c in range(other.tris[0], other.tris[1]):
+                theirs = of.part[m, k]
+                if boxes_meet(own.lo, own.hi, theirs.tri_lower, theirs.tri_upper):
+                    for c in range(theirs.tris[0], theirs.tris[1]):
                         t = near_tri[c]
                         if boxes_meet(own.lo, own.hi, lower[t], upper[t]):
                             if gap_to(p, q, mesh.tris[t], reach, x) <= reach:

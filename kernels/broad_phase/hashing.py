@@ -170,12 +170,12 @@ def visit_tets(
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
             if reaches(own, of.slab[m, k]):
-                other = of.part[m, k]
-                if boxes_meet(own.lo, own.hi, other.vert_lower, other.vert_upper):
+                theirs = of.part[m, k]
+                if boxes_meet(own.lo, own.hi, theirs.vert_lower, theirs.vert_upper):
                     body = of.other[m, k]
                     grow = wp.vec3(skin[body], skin[body], skin[body])
-                    lo = wp.max(own.lo - grow, other.vert_lower)
-                    hi = wp.min(own.hi + grow, other.vert_upper)
+                    lo = wp.max(own.lo - grow, theirs.vert_lower)
+                    hi = wp.min(own.hi + grow, theirs.vert_upper)
                     reach = skin[m] + skin[body]
                     visit_cells(
                         q, body, size, lo, hi, reach, mesh, cell_start, cell_vert, x, found, n_found

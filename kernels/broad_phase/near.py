@@ -63,7 +63,7 @@ def near_bodies(
     slab: wp.array2d[wp.vec4],  # (n_body, MANY) axis towards the near body, its begin along it [m]
     end: wp.array2d[float],  # (n_body, MANY) where body m ends along the axis [m]
     # out, added to
-    some: wp.array[int],  # (1,) 1 when any body is near another
+    any_pair: wp.array[int],  # (1,) 1 when any body is near another
 ):
     """One thread per body: list the bodies of its world that may touch it, if either is awake."""
     m = wp.tid()
@@ -94,7 +94,7 @@ def near_bodies(
                     count += 1
     n_near[m] = count
     if count > 0:
-        some[0] = 1
+        any_pair[0] = 1
 
 
 @wp.struct

@@ -134,7 +134,7 @@ def any_pairs(
     verts: wp.array[int],  # (1,)
     edges: wp.array[int],  # (1,)
     # out
-    some: wp.array[int],  # (1,) 1 when there are pairs of either kind
+    any_pair: wp.array[int],  # (1,) 1 when there are pairs of either kind
 ):
     """One thread: whether there is any pair."""
-    some[0] = wp.where(verts[0] + edges[0] > 0, 1, 0)
+    any_pair[0] = wp.where(verts[0] + edges[0] > 0, 1, 0)

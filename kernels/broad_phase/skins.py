@@ -61,7 +61,7 @@ def moved(
 
 
 @wp.kernel
-def track(
+def find_motion(
     # in
     vert_body: wp.array[int],  # (n_vert,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -154,7 +154,7 @@ def choose_skins(
     free: wp.array[float],  # (n_body,) [m]
     skin: wp.array[float],  # (n_body,) [m]
     stale: wp.array[int],  # (1,) 0
-    some: wp.array[int],  # (1,) 0
+    any_pair: wp.array[int],  # (1,) 0
 ):
     """One thread per body: its skin, and the part of it that is free."""
     m = wp.tid()
@@ -177,11 +177,11 @@ def choose_skins(
     free[m] = of_motion(motion[m], edge, looks) + 0.5 * push
     skin[m] = free[m] + of_motion(motion[m], edge, 1.0) + 0.5 * push
     stale[0] = 0
-    some[0] = 0
+    any_pair[0] = 0
 
 
 @wp.kernel
-def go_on(
+def add_motion(
     # in, out
     motion: wp.array[float],  # (n_body,) [m] 0 on return
     recent: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less

@@ -86,14 +86,14 @@ def begin_contacts(
         to.inv_mass = w
         to.inv_mass_turning = w
         to.gap = gap(at, x0)
-        to.gap_bound = (to.gap - REST_GAP * at.edge) / dt[0]
+        to.gap_bound = (to.gap - REST_GAP * at.edge_length) / dt[0]
         to.friction = friction
         largest = float(0.0)
         if w > 0.0 and not at.on_plane:
             for k in range(5):
                 to.turn[k] = gradient(k, at, x0)
                 largest = wp.max(largest, wp.length(to.turn[k]))
-        if largest * at.edge > TILTED:
+        if largest * at.edge_length > TILTED:
             to.turn = mat53()
         elif w > 0.0 and not at.on_plane:
             to.ramp = slope(at, x0)

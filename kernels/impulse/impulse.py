@@ -37,6 +37,7 @@ class Limits:
     tolerance: float  # of an edge: approach in a step that needs another sweep
     negligible: float  # [m] a smaller change in a step is negligible for other contacts
     sweeps: int  # at most
+    extrapolation: float  # 1, or 0 for plain sweeps
 
 
 @wp.kernel
@@ -130,13 +131,13 @@ def solve_contacts(
         new = Impulse()
         new.normal = wp.max(y[3] - excess / w, 0.0)
         off = wp.abs(new.normal - y[3]) * w
-        if off * dt[0] > limits.tolerance * at.edge and sweep < limits.sweeps:
+        if off * dt[0] > limits.tolerance * at.edge_length and sweep < limits.sweeps:
             again[0] = 1
         if rubs:
             new.friction = allowed(yt - (u - un * n) / w, new.normal, to.friction, to.ramp)
         beta = float(0.0)
         if not last:
-            beta = float(sweep - 1) / float(sweep + 2)
+            beta = limits.extrapolation * float(sweep - 1) / float(sweep + 2)
         if (y[3] - new.normal) * (new.normal - before.normal) > 0.0:
             beta = 0.0
         next_normal = new.normal + beta * (new.normal - before.normal)

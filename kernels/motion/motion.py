@@ -53,7 +53,7 @@ def gather(
 
 
 @wp.kernel
-def predict(
+def kick(
     # in
     vt_start: wp.array[int],  # (n_vert + 1,)
     vt_corner: wp.array[int],  # (4 n_tet,)

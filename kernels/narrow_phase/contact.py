@@ -34,7 +34,7 @@ class Contact:
     offset: float  # of a plane, else 0 [m]
     pair: wp.vec2i  # the two bodies, n_body + p for plane p
     on_plane: bool
-    edge: float  # mean edge of the first body [m]
+    edge_length: float  # mean edge of the first body [m]
 
 
 @wp.func

@@ -172,7 +172,7 @@ def edge_contacts(
             to.normal = now.n
             to.depth = now.d
             to.pair = wp.vec2i(mesh.vert_body[e[0]], pairs.pair[k][1])
-            to.edge = mesh.body_edge[mesh.vert_body[e[0]]]
+            to.edge_length = mesh.body_edge[mesh.vert_body[e[0]]]
             contact[c] = to
             source[c] = at
             at = now.next

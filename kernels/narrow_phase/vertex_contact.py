@@ -204,7 +204,7 @@ def vertex_contacts(
         for k in range(5):
             to.vert[k] = i
         to.pair = wp.vec2i(mesh.vert_body[i], body)
-        to.edge = mesh.body_edge[mesh.vert_body[i]]
+        to.edge_length = mesh.body_edge[mesh.vert_body[i]]
         to.on_plane = body >= mesh.n_body
         if to.on_plane:
             n = mesh.plane_n[body - mesh.n_body]

@@ -48,7 +48,7 @@ def begin_closure(
 ):
     """For each contact: the overlap that is left to later steps."""
     for c in range(wp.tid(), n_contact[0], threads):
-        edge = contact[c].edge
+        edge = contact[c].edge_length
         slack[c] = 0.0
         if residual[c] > 0.0:
             slack[c] = wp.max(residual[c] - bound * edge, 0.0) - REST_GAP * edge
@@ -61,7 +61,7 @@ def begin_closure(
 def solve_gaps(
     # in
     threads: int,
-    done: wp.array[int],  # (1,) passes so far
+    sweep: wp.array[int],  # (1,) number of this pass
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
@@ -81,7 +81,7 @@ def solve_gaps(
         w = constraint[c].inv_mass
         if w > 0.0:
             g = gap(at, x) + slack[c]
-            if g < -CLOSURE_TOLERANCE * at.edge and done[0] < PASSES:
+            if g < -CLOSURE_TOLERANCE * at.edge_length and sweep[0] < PASSES:
                 again[0] = 1
             p = wp.max(push[c] - g / w, 0.0)
         for k in range(5):

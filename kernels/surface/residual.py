@@ -44,7 +44,7 @@ def residual_gaps(
         if wp.length_sq(at.normal) == 0.0:
             continue
         d = -gap(at, x)
-        edge = at.edge
+        edge = at.edge_length
         if d > CLOSURE_TOLERANCE * edge:
             residual[c] = d
             found[OPEN] = 1
@@ -76,6 +76,6 @@ def find_strays(
         t2 = x[at.vert[4]]
         face = wp.normalize(wp.cross(t1 - t0, t2 - t0))
         w = projected_weights(p, at.normal, t0, t1, t2)
-        below = wp.dot(p - t0, face) < -CLOSURE_TOLERANCE * at.edge
+        below = wp.dot(p - t0, face) < -CLOSURE_TOLERANCE * at.edge_length
         if wp.min(w) < -STRAY or below:
             found[OPEN] = 1

@@ -7,7 +7,7 @@ import pytest
 
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box
 from warp_contact.frame import step_bounds
-from warp_contact.step.forces import RATE_MARGIN
+from warp_contact.frame.damping import RATE_MARGIN
 
 OMEGA = 1000.0  # [1/s]
 STABLE = OMEGA / (2.0 * step_bounds.SAFETY)  # steps [1/s] of a body that does not move

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box
 from warp_contact.frame import stepper
@@ -163,3 +164,45 @@ def test_buffers_outgrown_within_a_frame_end_it_at_once(looks, monkeypatch):
     assert looks(sim, 3) == expected  # no more: not one at what the outgrown buffers left
     assert sim._stepper.work.capacity.contacts > calm._stepper.work.capacity.contacts
     np.testing.assert_array_equal(sim.positions(), calm.positions())
+
+
+def stack() -> Scene:
+    """Blocks that fall onto each other, so that a frame has many steps."""
+    scene = Scene()
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    for k in range(3):
+        place = (0.0, 0.0, 0.05 + 0.11 * k)
+        scene.add_body(box(0.1, 2), NeoHookean(1e5, 0.3, 1000.0, 1e-3), place)
+    return scene
+
+
+@pytest.mark.parametrize("sleeping", [False, True])
+def test_a_frame_that_is_interrupted_anywhere_has_not_begun(rng, monkeypatch, sleeping):
+    interrupted, whole = (Simulation(stack(), sleeping=sleeping) for _ in range(2))
+    launch, left = wp.capture_launch, [10**9]
+
+    def stops(graph) -> None:
+        launch(graph)
+        left[0] -= 1
+        if left[0] < 0:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(wp, "capture_launch", stops)
+    for _ in range(6):
+        left[0] = 10**9
+        before = interrupted.positions(), interrupted.velocities(), interrupted.measure().forces
+        left[0] = int(rng.integers(0, 3))  # the steps, or a graph of the rates
+        try:
+            interrupted.step_frame()
+        except KeyboardInterrupt:
+            assert interrupted.frame == whole.frame
+            np.testing.assert_array_equal(interrupted.positions(), before[0])
+            np.testing.assert_array_equal(interrupted.velocities(), before[1])
+            assert interrupted.measure().forces == before[2]
+            left[0] = 10**9
+            interrupted.step_frame()
+        left[0] = 10**9
+        whole.step_frame()
+        np.testing.assert_array_equal(interrupted.positions(), whole.positions())
+        np.testing.assert_array_equal(interrupted.velocities(), whole.velocities())
+        assert interrupted.substeps == whole.substeps

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 from numpy.polynomial.legendre import Legendre
 
-from warp_contact.frame import step_bounds
+from warp_contact.frame import damping, step_bounds
 from warp_contact.kernels.motion import motion
 from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork
 from warp_contact.step import forces
@@ -90,7 +90,7 @@ def test_damping_is_beta_times_the_stiffness_at_rest(material, body, build_model
 
 
 @materials
-@pytest.mark.parametrize("share", forces.SHARE)
+@pytest.mark.parametrize("share", damping.SHARE)
 @pytest.mark.parametrize("stages", [1, 2, 3, 4, 7])
 def test_a_mode_shrinks_by_the_stability_polynomial(
     material, stages, share, body, rng, build_model, dense
@@ -109,7 +109,7 @@ def test_a_mode_shrinks_by_the_stability_polynomial(
 def test_with_the_least_share_no_mode_is_turned_round():
     z = np.linspace(0.0, 1.0, 10001)[:-1]
     for stages in range(1, 20):
-        factor = factors(stages, forces.SHARE[0], z)
+        factor = factors(stages, damping.SHARE[0], z)
         # P_s > -1 inside (-1, 1); only odd ones come near it, where z comes near its limit.
         assert factor.min() > 0.0
         assert factor.max() <= 1.0 + 1e-12  # rounding
@@ -117,23 +117,23 @@ def test_with_the_least_share_no_mode_is_turned_round():
 
 def test_steps_are_stable_whatever_share_is_needed():
     """Of any mode within reach, with and without a damping in proportion to its stiffness."""
-    ends = [forces.reach(stages, forces.SHARE[1]) for stages in range(1, 13)]
+    ends = [damping.reach(stages, damping.SHARE[1]) for stages in range(1, 13)]
     for z in [
         *np.geomspace(1e-3, 200.0, 400),
-        *np.array(ends) / forces.RATE_MARGIN * (1.0 - 1e-12),
+        *np.array(ends) / damping.RATE_MARGIN * (1.0 - 1e-12),
     ]:
-        stages, share = forces.stages_for(z, 1.0), forces.share_for(z, 1.0)
-        reach = forces.reach(stages, share)
+        stages, share = damping.stages_for(z, 1.0), damping.share_for(z, 1.0)
+        reach = damping.reach(stages, share)
         part = np.linspace(0.0, reach / limit(stages, share), 2001)
         least = factors(stages, share, part).min()
         assert least >= -1.0 / 6.0 - 1e-9  # rounding
-        h = forces.longest_step(stages, share)
+        h = damping.longest_step(stages, share)
         assert h**2 <= 2.0 * (1.0 + least) * (1.0 + 1e-9)  # rounding
         assert step_bounds.UNSTABLE * h > 2.0 * step_bounds.SAFETY
 
 
 @materials
-@pytest.mark.parametrize("share", forces.SHARE)
+@pytest.mark.parametrize("share", damping.SHARE)
 def test_damp_keeps_momentum_and_never_adds_energy(material, share, body, rng, build_model, dense):
     x = deformed(body[0], rng)
     model = build_model((*body, material))
@@ -197,11 +197,11 @@ def test_damp_replays_from_a_graph(body, rng, build_model):
 
 def test_enough_stages_are_taken():
     for z in (0.0, 1e-3, 1.0, 10.0, 1e3):
-        s = forces.stages_for(z / 1e-3, 1e-3)
-        share = forces.share_for(z / 1e-3, 1e-3)
-        assert forces.SHARE[0] <= share <= forces.SHARE[1]
-        assert z * forces.RATE_MARGIN <= forces.reach(s, share) * (1.0 + 1e-12)  # rounding
-        assert s == 0 or z * forces.RATE_MARGIN > forces.reach(s - 1, forces.SHARE[1])
+        s = damping.stages_for(z / 1e-3, 1e-3)
+        share = damping.share_for(z / 1e-3, 1e-3)
+        assert damping.SHARE[0] <= share <= damping.SHARE[1]
+        assert z * damping.RATE_MARGIN <= damping.reach(s, share) * (1.0 + 1e-12)  # rounding
+        assert s == 0 or z * damping.RATE_MARGIN > damping.reach(s - 1, damping.SHARE[1])
 
 
 @pytest.mark.parametrize("material", [NeoHookean, Corotated])
@@ -237,12 +237,12 @@ def modal_motion(model, x, rest, weight, h: float, rate: float, steps: int):
     w = (wp.zeros_like(x), wp.zeros_like(x))
     f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
     mask = wp.full(model.n_tet, 1, dtype=int)
-    stages, share = forces.stages_for(rate, h), forces.share_for(rate, h)
+    stages, share = damping.stages_for(rate, h), damping.share_for(rate, h)
     dt, share = (wp.full(1, value, dtype=float) for value in (h, share))
     gather = [model.vt_start, model.vt_corner, f_tet, model.inv_mass, wp.vec3(*model.gravity), dt]
     with wp.ScopedCapture() as capture:
         forces.internal_forces(model, x, mask, f_tet)
-        wp.launch(motion.predict, dim=model.n_vert, inputs=[*gather, x, v], outputs=[unused, v])
+        wp.launch(motion.kick, dim=model.n_vert, inputs=[*gather, x, v], outputs=[unused, v])
         forces.damp(model, x, v, model.inv_mass, dt, f_tet, w, stages, share)
         wp.launch(motion.advance, dim=model.n_vert, inputs=[dt, x, v], outputs=[x])
     q, p = np.empty(steps), np.empty(steps)

@@ -278,3 +278,17 @@ def test_codes_follow_a_z_order_curve():
     octant[:2] = 0, 7
     along = octant[np.argsort(topology.morton_codes(x))]
     assert (np.diff(along) >= 0).all()
+
+
+def test_usd_that_stands_on_its_side_is_turned_so_that_z_is_up(tmp_path):
+    tall = box((0.1, 0.2, 0.6), 1)
+    stage = Usd.Stage.CreateNew(str(tmp_path / "y_up.usda"))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    prim = UsdGeom.TetMesh.Define(stage, "/tall")
+    x, y, z = tall.vertices.T
+    prim.CreatePointsAttr(np.stack([x, z, -y], axis=1).tolist())  # y is up, a right-handed frame
+    prim.CreateTetVertexIndicesAttr(tall.tets.tolist())
+    stage.Save()
+    found = TetMesh.load(tmp_path / "y_up.usda")
+    np.testing.assert_allclose(found.vertices, tall.vertices, atol=1e-7)  # float32
+    np.testing.assert_array_equal(found.tets, tall.tets)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warp_contact import ContactSurface, NeoHookean, Penalty, Scene, box
+from warp_contact import ContactSurface, NeoHookean, Penalty, Scene, Simulation, box
 from warp_contact.scene.scene import rotation_matrix
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -92,3 +92,42 @@ def test_a_plane_is_normalised_but_its_offset_is_a_length():
 def test_a_response_without_sense_is_refused(response, options):
     with pytest.raises(ValueError, match=r"neither|not a |not positive|negative"):
         response(**options)
+
+
+def test_a_scene_that_a_simulation_has_taken_over_refuses_to_change():
+    scene = Scene()
+    ball = box(0.1, 1), NeoHookean(1e5, 0.3, 1000.0)
+    scene.add_body(*ball)
+    sims = [Simulation(scene) for _ in range(2)]  # of the same scene, as for a comparison
+    assert sims[0].scene is sims[1].scene
+    changes = (
+        lambda: scene.add_body(*ball),
+        lambda: scene.add_plane((0.0, 0.0, 1.0)),
+        lambda: setattr(scene, "friction", 0.0),
+        lambda: setattr(scene, "gravity", (0.0, 0.0, 0.0)),
+    )
+    for change in changes:
+        with pytest.raises(ValueError, match="build another scene"):
+            change()
+    assert len(scene.bodies) == 1 and scene.planes == ()
+
+
+@pytest.mark.parametrize("response", [Penalty, "penalty", 3.0])
+def test_what_is_no_response_is_refused_before_the_first_step(response):
+    scene = Scene()
+    scene.add_body(box(0.1, 1), NeoHookean(1e5, 0.3, 1000.0))
+    with pytest.raises(ValueError, match=r"response .* is none of wc.ContactSurface"):
+        Simulation(scene, response)
+
+
+def test_a_body_may_be_named_by_its_label():
+    scene = Scene()
+    for k, name in enumerate(("lower", "upper")):
+        place = (0.0, 0.0, 0.2 * k)
+        scene.add_body(box(0.1, 1), NeoHookean(1e5, 0.3, 1000.0), place, label=name)
+    sim = Simulation(scene)
+    np.testing.assert_array_equal(sim.positions("upper"), sim.positions(1))
+    sim.set_velocity("upper", (1.0, 0.0, 0.0))
+    assert sim.velocities(1)[:, 0].min() == 1.0 and not sim.velocities("lower").any()
+    with pytest.raises(ValueError, match="no body 'middle': the scene has lower, upper"):
+        sim.positions("middle")

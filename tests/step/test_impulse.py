@@ -177,7 +177,7 @@ def test_recorded_impulses_of_a_pair_are_its_sum(rng, stages, find_contacts, jit
     ahead = wp.array(state.x.numpy() + DT * v0, dtype=wp.vec3)
     find_contacts(model, work, state.x, ahead)
     impulse.exchange(model, state.v, work)
-    impulse.record(work)
+    impulse.add_forces(work)
     mass = model.mass.numpy().astype(float)[:, None]
     first = np.flatnonzero(model.vert_body.numpy() == 0)
     got = np.zeros(3)

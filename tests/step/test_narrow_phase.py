@@ -45,7 +45,7 @@ def test_a_body_near_very_many_others_misses_none(rng, stages, jittered, turned,
     assert near.n_near.numpy()[0] > near.other.shape[1]
     sure, doubtful = brute_force(scene, state.x.numpy().astype(float))
     assert sure and sure <= pairs <= sure | doubtful
-    narrow_phase.forget_edges(work)
+    narrow_phase.clear_places(work)
     narrow_phase.find_inner_edges(model, state.x, state.x, work)
     assert work.narrow_phase.n_crossing.numpy()[0] > 0
 

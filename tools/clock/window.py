@@ -12,7 +12,7 @@ import warp as wp
 from clock.memory import Snapshot, held
 from clock.timer import StageTimer
 from warp_contact import Simulation
-from warp_contact.step.forces import share_for, stages_for
+from warp_contact.frame.damping import share_for, stages_for
 from warp_contact.step.loop import step_of
 from warp_contact.step.motion import drift, predict
 

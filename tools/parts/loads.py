@@ -75,7 +75,7 @@ def sheet() -> dict[str, float]:
     with (
         mock.patch.multiple(static, SETTLE=0.3, SAMPLE=0.1),
         mock.patch.object(impulse, "_sweep", counting(impulse._sweep, sweeps)),
-        mock.patch.object(impulse, "record", counting(impulse.record, steps)),
+        mock.patch.object(impulse, "add_forces", counting(impulse.add_forces, steps)),
     ):
         list(static.on_sheet("", Ask()))
     return {SWEEPS: float(sweeps.numpy()[0] / steps.numpy()[0])}

@@ -22,6 +22,20 @@ class ContactForces:
     pair_total: wp.array2d[wp.int64]
 
 
+def copied(forces: ContactForces) -> ContactForces:
+    """The same in arrays of its own."""
+    arrays = forces.received, forces.pair_key, forces.pair_total
+    return ContactForces(forces.unit, *(wp.clone(array) for array in arrays))
+
+
+def copy(to: ContactForces, of: ContactForces) -> None:
+    """Overwrite one with another; there is room for its pairs."""
+    n = of.pair_key.shape[0]
+    wp.copy(to.received, of.received)
+    wp.copy(to.pair_key[:n], of.pair_key)
+    wp.copy(to.pair_total[:n], of.pair_total)
+
+
 def allocate(n_vert: int, n_pair: int, unit: float) -> ContactForces:
     """Allocate without any impulse."""
     return ContactForces(

@@ -36,6 +36,6 @@ def _scan_in_chunks(values: wp.array, scratch: list[wp.array], inclusive: bool, 
     before = scratch[-1]  # the last level, of one value, is never a sum: it stays 0
     for level in reversed(levels):
         n = -(-level.shape[0] // chunk)
-        own = inclusive and level is values
+        own = int(inclusive and level is values)
         wp.launch(kernels.scan_chunks, dim=n, inputs=[chunk, own, before], outputs=[level])
         before = level

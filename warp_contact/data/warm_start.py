@@ -39,6 +39,11 @@ def allocate(n_vert: int, n_contact: int) -> WarmStart:
     )
 
 
+def copied(warm: WarmStart) -> WarmStart:
+    """The same in arrays of its own."""
+    return WarmStart(*(wp.clone(array) for array in vars(warm).values()))
+
+
 def copy(to: WarmStart, of: WarmStart) -> None:
     """Overwrite one with another, whose contacts fit."""
     wp.copy(to.partner, of.partner)

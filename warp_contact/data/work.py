@@ -17,7 +17,7 @@ from warp_contact.data import (
 )
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
-from warp_contact.data.structs import mesh_of, mobility_of
+from warp_contact.data.structs import lumped, mesh_of
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.mobility import Mobility
 
@@ -105,7 +105,7 @@ def allocate_work(
         steps=wp.zeros(1, dtype=int),
         awake=awake or everything(model),
         mesh=mesh_of(model, broad.surface),
-        mobility=mobility_of(model),
+        mobility=lumped(model),
         scan=scan.allocate(
             max(2 * n + 2, model.n_edge + 1, capacity.verts + 1, capacity.edges + 1)
         ),

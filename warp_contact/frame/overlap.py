@@ -8,7 +8,7 @@ from warp_contact.step.detection import detect_vertices
 
 
 def overlaps(model: Model, state: State, work: Work) -> bool:
-    """Whether bodies overlap by enough for a search; reads back.
+    """Whether vertices lie deep enough in other bodies for a search; reads back.
 
     Pairs and contacts that did not fit were not tested: see ``work.overflow``.
     """

@@ -15,7 +15,6 @@ import numpy as np
 import warp as wp
 
 from warp_contact.data import boxes
-from warp_contact.data.contact_forces import ContactForces
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work
@@ -73,6 +72,18 @@ class Sleeping:
         if n:
             work.forces.pair_key[:n].assign(values["pair_key"])
             work.forces.pair_total[:n].assign(values["pair_total"])
+
+    def save(self) -> None:
+        """Keep what ``update`` changes."""
+        arrays = self._anchor, self._frames, self.awake.bodies, self.awake.tets, self.awake.inv_mass
+        self._saved = [(array, wp.clone(array)) for array in arrays]
+        self._saved_before = self._before
+
+    def undo(self) -> None:
+        """Put back what was kept."""
+        for array, kept in self._saved:
+            wp.copy(array, kept)
+        self._before = self._saved_before
 
     def wake(self, body: int) -> None:
         """Wake a body: its rest begins again."""
@@ -164,11 +175,3 @@ class Sleeping:
             inputs=[awake.bodies],
             outputs=[work.forces.pair_key, work.forces.pair_total],
         )
-
-
-def keep_forces(before: ContactForces, after: ContactForces) -> None:
-    """Copy the contact forces of the last frame, which those asleep still have, to a larger one."""
-    n = before.pair_key.shape[0]
-    wp.copy(after.received, before.received)
-    wp.copy(after.pair_key[:n], before.pair_key)
-    wp.copy(after.pair_total[:n], before.pair_total)

@@ -112,6 +112,17 @@ class Spectrum:
         """Largest eigenvalue [1/s] of M^-1 C at the positions ``x`` [m]; 0 without damping."""
         return float(self._damping_rates(x).max())
 
+    def save(self) -> None:
+        """Keep what ``rates`` changes."""
+        starts = {apply: wp.clone(start) for apply, start in self._start.items()}
+        self._saved = starts, self._at, self._of_bodies, self.flat
+
+    def undo(self) -> None:
+        """Put back what was kept."""
+        self._start, self._at, self._of_bodies, self.flat = self._saved
+        if self._at is not None:
+            self._remember(wp.array(self._at, dtype=wp.vec3))
+
     def starts(self) -> dict[str, np.ndarray]:
         """What the next calls start from."""
         starts = {apply.__name__: start.numpy() for apply, start in self._start.items()}

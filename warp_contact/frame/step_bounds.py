@@ -8,14 +8,14 @@
 omega is the largest frequency of the elastic forces [1/s], u the largest relative speed [m/s], t
 the thickness of the thinnest body [m] and e the shortest mean edge of a body [m], all at the start
 of the frame. LINGERING replaces TRAVEL while there may be overlaps older than the step. At the end
-of the frame the step must still be below ``UNSTABLE`` of ``forces.longest_step`` / omega, and its
-damping within ``forces.reach``. A frame that fails is repeated at the rates found there.
+of the frame the step must still be below ``UNSTABLE`` of ``damping.longest_step`` / omega, and its
+damping within ``damping.reach``. A frame that fails is repeated at the rates found there.
 """
 
 import math
 
+from warp_contact.frame.damping import longest_step, reach, share_for, stages_for
 from warp_contact.kernels.lengths import LINGERING, TRAVEL
-from warp_contact.step.forces import longest_step, reach, share_for, stages_for
 
 SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
 UNSTABLE = 0.99  # of the longest stable step at the end of a frame, above which it is repeated
@@ -26,9 +26,8 @@ REACH = 0.25  # of the thinnest body: the largest relative motion in a step
 PATIENCE = 2.0  # times the stable number of steps: more are not taken for TRAVEL or LINGERING
 BLURRED = 1.05  # times the stable step: its uncertainty
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 lets some pass
-KEEP = (
-    0.9  # of the last frame's steps, at least: a step that follows a vibration pumps energy into it
-)
+# Of the last frame's steps, at least: a step that follows a vibration pumps energy into it.
+KEEP = 0.9
 
 
 def steps_per_second(

@@ -1,12 +1,11 @@
 """One frame of a simulation, repeated where its steps were too long or its buffers too small."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import warp as wp
 
-from warp_contact.data import warm_start
+from warp_contact.data import contact_forces, warm_start
 from warp_contact.data.model import Model
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.state import State
@@ -14,9 +13,12 @@ from warp_contact.data.work import Work, allocate_work
 from warp_contact.errors import SimulationError
 from warp_contact.frame import checkpoint
 from warp_contact.frame.capacity import enlarged
-from warp_contact.frame.diagnosis import flattest_tet, lost_vertex, vertex_name
+from warp_contact.frame.damping import share_for, stages_for
+from warp_contact.frame.diagnosis import lost_vertex
+from warp_contact.frame.frame_start import FrameStart
 from warp_contact.frame.overlap import overlaps
-from warp_contact.frame.sleeping import Sleeping, keep_forces
+from warp_contact.frame.rates import NO_RATES, rates_now
+from warp_contact.frame.sleeping import Sleeping
 from warp_contact.frame.spectrum import Spectrum
 from warp_contact.frame.step_bounds import (
     CUT_SHORT,
@@ -27,7 +29,6 @@ from warp_contact.frame.step_bounds import (
     stays_stable,
 )
 from warp_contact.frame.step_count import StepCount
-from warp_contact.step.forces import share_for, stages_for
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.motion import kick
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
@@ -35,7 +36,6 @@ from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 NEIGHBOURS = 8  # initial capacity: pairs with a contact force for each body
 IMPULSE_UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
 HALVED = 3  # times at most that a step is halved because state or stiffness is not finite
-NO_RATES = math.inf, math.inf  # of a state that is not finite
 PART = 8  # steps between two checks of the rates, in frames that begin or end with a flat tet
 ATTEMPTS = 12  # at a frame, with shorter steps each time
 
@@ -83,8 +83,7 @@ class Stepper:
         pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
         self.work: Work = self._allocate(Capacity(pairs=pairs))
         self._graphs: dict[tuple[int, bool], wp.Graph] = {}
-        self._saved = State(wp.clone(state.x), wp.clone(state.v))
-        self._saved_warm = warm_start.allocate(model.n_vert, self.work.capacity.contacts)
+        self._start = FrameStart(state, self.work)
 
     def step(self, frame: int) -> None:
         """Step frame number ``frame``.
@@ -93,15 +92,20 @@ class Stepper:
         that came, is repeated from its start. If it begins or ends with a tet that is nearly
         flat, the rates are checked every ``PART`` steps.
 
+        Whatever ends it early, an interrupt too, leaves all as the last frame had left it.
+
         Raises:
-            SimulationError: no step is stable, or the state does not stay finite; it is then that
-                of the last finished frame
+            SimulationError: no step is stable, or the state does not stay finite
         """
-        if self._all_sleep():
-            return
-        wp.copy(self._saved.x, self._state.x)
-        wp.copy(self._saved.v, self._state.v)
-        warm_start.copy(self._saved_warm, self.work.warm)
+        self._begin()
+        try:
+            if not self._all_sleep():
+                self._step(frame)
+        except BaseException:
+            self._undo()
+            raise
+
+    def _step(self, frame: int) -> None:
         while self.overlapping is None or self.grow():
             self.overlapping = overlaps(self._model, self._state, self.work)
         self.dt, self.rates = self._find_step(frame)
@@ -109,9 +113,9 @@ class Stepper:
 
     def _all_sleep(self) -> bool:
         """Decide which bodies sleep; where all do, nothing moves in this frame."""
-        if (
-            not self.sleeping or self.overlapping is not False
-        ):  # an overlap that is left has to be searched
+        if not self.sleeping:
+            return False
+        if self.overlapping is not False:  # an overlap that is left has to be searched
             return False
         if self.sleeping.update(self._state, self.work):
             return False
@@ -132,7 +136,7 @@ class Stepper:
             flat = in_parts or bool(wrong) or self._flat()
             if fits and (in_parts or not flat):
                 return dt, after
-            self._go_back()
+            self._start.go_back(self._state, self.work)
             if wrong:
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
                     raise SimulationError(f"frame {frame}: {wrong} ({self.n} substeps)")
@@ -143,17 +147,6 @@ class Stepper:
                 omega, rate = raised((omega, rate), after, dt, least)
             in_parts = flat
         raise SimulationError(f"frame {frame}: no stable step found ({self.n} substeps)")
-
-    def _look(self) -> tuple[tuple[float, float], str]:
-        """Rates of the present state [1/s], and what is wrong with it: empty if nothing is."""
-        lost = lost_vertex(self._state)
-        if lost is not None:
-            return NO_RATES, f"{vertex_name(self._model, lost)} is no longer finite"
-        after = self.spectrum.rates(self._state.x)
-        if not np.isfinite(after).all():
-            tet = flattest_tet(self._model, self._state.x)
-            return NO_RATES, f"stiffness is no longer finite, the flattest is {tet}"
-        return after, ""
 
     def _flat(self) -> bool:
         """Whether a tet was flat at the last check, and the number of steps is free."""
@@ -182,11 +175,11 @@ class Stepper:
         capacity = enlarged(self.work)
         if capacity is None:
             return False
-        self._go_back()
         forces = self.work.forces
         self._replace_work(capacity)
+        self._start.go_back(self._state, self.work)
         if self.sleeping:
-            keep_forces(forces, self.work.forces)
+            contact_forces.copy(self.work.forces, forces)
         return True
 
     def values(self) -> dict[str, np.ndarray]:
@@ -228,8 +221,8 @@ class Stepper:
     ) -> tuple[float, tuple[float, float], str]:
         """Step the frame at the rates [1/s] given, after ``last`` steps.
 
-        Return the step [s] and what ``_look`` finds at the end. With ``in_parts`` the frame ends as
-        soon as its step no longer fits. Where buffers were too small, nothing was found.
+        Return the step [s] and what ``rates_now`` finds at the end. With ``in_parts`` the frame
+        ends as soon as its step no longer fits. Where buffers were too small, nothing was found.
         """
         work = self.work
         if self.sleeping:
@@ -257,7 +250,7 @@ class Stepper:
             wp.capture_launch(self._graph(damping_stages))
             if enlarged(work) is not None:
                 break
-            after, wrong = self._look()
+            after, wrong = rates_now(self._model, self._state, self.spectrum)
             if wrong or not self._fits(dt, rate, after):
                 break
         return dt, after, wrong
@@ -283,17 +276,24 @@ class Stepper:
         del self.work
         try:
             self.work = self._allocate(capacity)
-            saved = warm_start.allocate(self._model.n_vert, capacity.contacts)
         except RuntimeError:  # there is no memory for it
             self.work = self._allocate(before)
-            warm_start.copy(self.work.warm, self._saved_warm)
             raise
-        warm_start.copy(saved, self._saved_warm)
-        warm_start.copy(self.work.warm, saved)
-        self._saved_warm = saved
 
-    def _go_back(self) -> None:
-        """Restore the state at the start of the frame."""
-        wp.copy(self._state.x, self._saved.x)
-        wp.copy(self._state.v, self._saved.v)
-        warm_start.copy(self.work.warm, self._saved_warm)
+    def _begin(self) -> None:
+        """Keep what a frame changes."""
+        self._start.keep(self._state, self.work)
+        self._choice = self.n, self.dt, self.rates, self.overlapping
+        self.spectrum.save()
+        if self.sleeping:
+            self.sleeping.save()
+
+    def _undo(self) -> None:
+        """Leave the frame as if it had not begun, wherever it was interrupted."""
+        self.n, self.dt, self.rates, self.overlapping = self._choice
+        self.spectrum.undo()
+        if self.sleeping:
+            self.sleeping.undo()
+        if not hasattr(self, "work"):  # interrupted while the buffers grew
+            self.work = self._allocate(Capacity(pairs=self._start.n_pair))
+        self._start.undo(self._state, self.work)

@@ -111,8 +111,9 @@ class TetMesh:
         """Read what ``save`` writes; the unit is the metre.
 
         From USD comes the first TetMesh or the one at the path ``prim``, as placed in the stage at
-        its earliest time, and in metres where the stage says what its unit is. Other formats often
-        list auxiliary vertices: those that no tet uses are dropped.
+        its earliest time, in metres where the stage says what its unit is, and with z up where it
+        says that y is. Other formats often list auxiliary vertices: those that no tet uses are
+        dropped.
         """
         path = Path(path)
         if not path.exists():
@@ -200,4 +201,6 @@ def _load_usd(path: Path, name: str | None) -> tuple[np.ndarray, np.ndarray]:
     place = np.array(tetmesh.ComputeLocalToWorldTransform(time))  # acts on row vectors
     stated = stage.HasAuthoredMetadata("metersPerUnit")
     unit = UsdGeom.GetStageMetersPerUnit(stage) if stated else 1.0
-    return unit * (points @ place[:3, :3] + place[3, :3]), tets
+    x = unit * (points @ place[:3, :3] + place[3, :3])
+    y_up = stage.HasAuthoredMetadata("upAxis") and UsdGeom.GetStageUpAxis(stage) == "Y"
+    return x[:, [0, 2, 1]] * (1.0, -1.0, 1.0) if y_up else x, tets

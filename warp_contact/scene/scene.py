@@ -52,9 +52,25 @@ class Scene:
         self.friction = float(numbers(friction, (), "friction"))
         if self.friction < 0.0:
             raise ValueError(f"friction {friction} is negative")
-        self.bodies: list[Body] = []
+        self.bodies: list[Body] | tuple[Body, ...] = []
         self._labels: set[str] = set()
-        self.planes: list[tuple[np.ndarray, float]] = []
+        self.planes: list[tuple[np.ndarray, float]] | tuple = []
+
+    def __setattr__(self, name: str, value) -> None:
+        """Raises ValueError for a scene that a simulation has taken over."""
+        self._refuse_if_frozen(name)
+        super().__setattr__(name, value)
+
+    def freeze(self) -> None:
+        """Let nothing be changed or added from now on: a simulation does not see it."""
+        if "_frozen" not in vars(self):
+            self.bodies, self.planes = tuple(self.bodies), tuple(self.planes)
+            self._frozen = True
+
+    def _refuse_if_frozen(self, what: str) -> None:
+        if "_frozen" in vars(self):
+            after = "after a Simulation was made of the scene; build another scene"
+            raise ValueError(f"{what} cannot be changed or added {after}")
 
     def add_body(
         self,
@@ -104,6 +120,7 @@ class Scene:
 
     def _new_label(self, label: str | None) -> str:
         """A label that no body has; raises ValueError for one that is taken or that of a plane."""
+        self._refuse_if_frozen("a body")
         label = f"body{len(self.bodies)}" if label is None else str(label)
         if label in self._labels:
             raise ValueError(f"body '{label}': another body has this label")
@@ -113,6 +130,7 @@ class Scene:
 
     def add_plane(self, normal, offset: float = 0.0) -> None:
         """Keep every body in the half-space normal . x >= offset [m]."""
+        self._refuse_if_frozen("a plane")
         n = numbers(normal, (3,), "plane normal")
         length = float(np.linalg.norm(n))
         if length == 0.0:

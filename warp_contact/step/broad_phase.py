@@ -37,7 +37,7 @@ def track(model: Model, x: wp.array, work: Work) -> None:
     b = work.broad_phase
     _move(model, x, work)
     outputs = [b.motion, b.recent, b.travelled, work.narrow_phase.n_new]
-    wp.launch(skins.go_on, dim=model.n_body, inputs=[], outputs=outputs)
+    wp.launch(skins.add_motion, dim=model.n_body, inputs=[], outputs=outputs)
 
 
 def _find(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
@@ -74,12 +74,12 @@ def _move(model: Model, x: wp.array, work: Work) -> None:
     b = work.broad_phase
     chunks = -(-model.n_vert // int(skins.CHUNK))
     inputs = [model.vert_body, x]
-    wp.launch(skins.track, dim=chunks, inputs=inputs, outputs=[b.last, b.motion])
+    wp.launch(skins.find_motion, dim=chunks, inputs=inputs, outputs=[b.last, b.motion])
 
 
 def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
     """Set ``free`` and ``skin`` for a step to ``x1``, ``near`` and the boxes of the bodies."""
-    b, edge = work.broad_phase, work.mesh.edge
+    b, edge = work.broad_phase, work.mesh.shortest_edge
     b.motion.zero_()
     b.fastest.zero_()
     _move(model, x1, work)

@@ -11,7 +11,7 @@ from warp_contact.step import impulse, narrow_phase
 def detect(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """Contacts of vertices and edges at ``x``, in a step from ``x0``, and their constants."""
     narrow_phase.find_inner_vertices(model, x0, x, work)
-    narrow_phase.forget_edges(work)
+    narrow_phase.clear_places(work)
     narrow_phase.find_inner_edges(model, x0, x, work)
     _hold(model, x0, work)
 
@@ -19,7 +19,7 @@ def detect(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
 def detect_apart(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """The same where bodies were apart when the step began."""
     narrow_phase.find_entered_vertices(model, x0, x, work)
-    narrow_phase.forget_edges(work)
+    narrow_phase.clear_places(work)
     narrow_phase.find_entered_edges(model, x0, x, work)
     _hold(model, x0, work)
 

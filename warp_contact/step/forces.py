@@ -1,15 +1,9 @@
 """Elastic and damping forces of all bodies."""
 
-import math
-
 import warp as wp
 
 from warp_contact.data.model import Model
 from warp_contact.kernels.motion import motion
-
-RATE_MARGIN = 1.1  # on the damping rate, which is estimated and grows within a frame
-USED_RANGE = 0.95  # part of the stable range that is used: at its end the stages do not damp
-SHARE = 0.5, 7.0 / 9.0  # least and largest: a mode changes sign at a sixth of its speed at most
 
 
 def internal_forces(model: Model, x: wp.array, mask: wp.array, f_tet: wp.array) -> None:
@@ -75,9 +69,10 @@ def damp(
     """Damp ``v`` [m/s] over ``dt`` [s], shape (1,), at fixed positions ``x`` [m].
 
     Solves M dv/dt = -C(x) v in ``stages`` stages of ``motion.relax``, whose result counts by
-    ``share`` [-], shape (1,): no mode grows for dt lambda_max(M^-1 C) up to ``reach``. Momentum is
-    kept, vertices with ``inv_mass`` [1/kg] 0 keep their velocity. Scratch:
-    ``f_tet`` (4 n_tet,) and two arrays (n_vert,). Without a damped body nothing is launched.
+    ``share`` [-], shape (1,). No mode grows for dt lambda_max(M^-1 C) up to ``reach`` of
+    frame/damping.py. Momentum is kept, and vertices with ``inv_mass`` [1/kg] 0 keep their velocity.
+    Scratch: ``f_tet`` (4 n_tet,) and two arrays (n_vert,). Nothing is launched without a damped
+    body.
     """
     if stages == 0 or not any(e.damped for e in model.elements):
         return
@@ -94,35 +89,3 @@ def damp(
             outputs=[last, before, out],
         )
         last, before = out, last
-
-
-def stages_for(rate: float, dt: float) -> int:
-    """Return the stages that ``damp`` needs for lambda_max ``rate`` [1/s] and step ``dt`` [s]."""
-    z = RATE_MARGIN * rate * dt
-    if z <= reach(1, SHARE[1]):
-        return 1 if z > 0.0 else 0
-    return max(2, math.ceil(0.5 * (math.sqrt(1.0 + 4.0 * z / (USED_RANGE * SHARE[1])) - 1.0)))
-
-
-def share_for(rate: float, dt: float) -> float:
-    """Return the smallest share that is stable then: it reverses fast modes the least."""
-    stages = stages_for(rate, dt)
-    needed = RATE_MARGIN * rate * dt / reach(stages, 1.0) if stages > 1 else 0.0
-    return max(SHARE[0], needed)
-
-
-def reach(stages: int, share: float) -> float:
-    """Largest dt lambda_max of ``stages`` whose result counts by ``share``.
-
-    One stage has p = 1 - z for any share: above 0 for z up to 1.
-    """
-    return float(stages) if stages < 2 else USED_RANGE * share * (stages * stages + stages)
-
-
-def longest_step(stages: int, share: float) -> float:
-    """Longest stable step times the frequency of a mode, whichever way it is damped.
-
-    (h w)^2 < 2 (1 + p) with the least p of motion/motion.py, as P_s >= -1/2 within ``USED_RANGE``,
-    or with p = 0 where that is less.
-    """
-    return 2.0 if stages == 0 else math.sqrt(2.0 if stages == 1 else min(2.0, 4.0 - 3.0 * share))

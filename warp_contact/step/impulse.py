@@ -38,13 +38,16 @@ def solve_again(model: Model, state: State, work: Work) -> None:
 
 
 def finish(work: Work) -> None:
-    """Keep the impulses for the next step, and add them to the forces of the frame."""
+    """Keep the impulses of vertices for the next step, and add all to the forces of the frame.
+
+    Those of edges were kept by each ``exchange``, which may be followed by another.
+    """
     warm_start.keep_vertices(work)
-    record(work)
+    add_forces(work)
 
 
 def forget(work: Work) -> None:
-    """There are no contacts in this step."""
+    """Clear the contacts and what the next step would start from: nothing touches."""
     work.contacts.n_vertex.zero_()
     work.narrow_phase.n_crossing.zero_()
     work.contacts.n.zero_()
@@ -57,7 +60,10 @@ def begin(model: Model, x0: wp.array, work: Work) -> None:
 
 
 def exchange(model: Model, v: wp.array, work: Work) -> None:
-    """Change ``v`` by normal impulses and friction until no contact approaches."""
+    """Change ``v`` by normal impulses and friction until no contact approaches.
+
+    The contacts of edges are kept, with their impulses, for the next step.
+    """
     sweeps.repeat(work, _sweep, model, v, work)
     sweeps.count(work)
     _sweep(model, v, work, last=True)
@@ -65,7 +71,7 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
 
 
 def apply(model: Model, v: wp.array, work: Work) -> None:
-    """Add the parts of the contacts to ``v``."""
+    """Add the parts of the contacts to ``v``, and to the impulses of the frame."""
     c = work.contacts
     launch_over(
         kernels.apply_impulses,
@@ -75,7 +81,7 @@ def apply(model: Model, v: wp.array, work: Work) -> None:
     )
 
 
-def record(work: Work) -> None:
+def add_forces(work: Work) -> None:
     """Add the impulses of all contacts to their pairs of bodies."""
     c, forces = work.contacts, work.forces
     launch_over(
@@ -115,7 +121,6 @@ def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
 
 def _sweep(model: Model, v: wp.array, work: Work, last: bool = False) -> None:
     c, s, limits = work.contacts, work.sweeps, _limits(work)
-    last = last or not on("extrapolation")
     launch_over(
         kernels.solve_contacts,
         work.capacity.contacts,
@@ -132,6 +137,7 @@ def _sweep(model: Model, v: wp.array, work: Work, last: bool = False) -> None:
 
 def _limits(work: Work) -> kernels.Limits:
     limits = kernels.Limits()
+    limits.extrapolation = 1.0 if on("extrapolation") else 0.0
     limits.tolerance, limits.sweeps = IMPULSE_TOLERANCE, SWEEPS
-    limits.negligible = NEGLIGIBLE * IMPULSE_TOLERANCE * work.mesh.edge
+    limits.negligible = NEGLIGIBLE * IMPULSE_TOLERANCE * work.mesh.shortest_edge
     return limits

@@ -32,10 +32,10 @@ def predict(model: Model, state: State, work: Work, damping_stages: int) -> None
 
 
 def kick(model: Model, state: State, work: Work) -> None:
-    """Add the acceleration by internal forces and gravity over ``work.dt`` to ``state.v``."""
+    """Add the acceleration over ``work.dt`` to ``state.v``, and set ``work.x`` = x + h v."""
     internal_forces(model, state.x, work.awake.tets, work.f_tet)
     wp.launch(
-        motion.predict,
+        motion.kick,
         dim=model.n_vert,
         inputs=[model.vt_start, model.vt_corner, work.f_tet, work.awake.inv_mass]
         + [wp.vec3(*model.gravity), work.dt, state.x, state.v],

@@ -40,7 +40,7 @@ def find_inner_edges(model: Model, x0: wp.array, x: wp.array, work: Work) -> Non
     _find_edges(model, x0, x, work, apart=False)
 
 
-def forget_edges(work: Work) -> None:
+def clear_places(work: Work) -> None:
     """Begin without contacts of edges."""
     work.narrow_phase.place.fill_(-1)
     work.narrow_phase.n_place.zero_()
@@ -48,7 +48,7 @@ def forget_edges(work: Work) -> None:
 
 def continue_edges(model: Model, x0: wp.array, work: Work) -> None:
     """Begin with the persistent contacts of edges; the step begins at ``x0``."""
-    none = partial(forget_edges, work)
+    none = partial(clear_places, work)
     if not on("persistent edges"):
         return none()
     if_any(work.warm.n_edge, _continue_edges, model, x0, work, otherwise=none)

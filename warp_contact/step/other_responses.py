@@ -16,7 +16,7 @@ from warp_contact.step.response import Penalty
 def step_literal(
     model: Model, state: State, work: Work, damping_stages: int, iterations: int
 ) -> None:
-    """The paper as printed: displacement first, then velocities."""
+    """The order and the bisection of the paper: displacement first, then velocities."""
     predict(model, state, work, damping_stages)
     broad_phase.refresh(model, state.x, work.x, work)
     wp.copy(state.x, work.x)
@@ -24,7 +24,7 @@ def step_literal(
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, search.bisect, model, state.x, work, iterations)
     if_any(work.contacts.n, impulse.exchange, model, state.v, work)
-    impulse.record(work)
+    impulse.add_forces(work)
 
 
 def step_penalty(
@@ -35,7 +35,7 @@ def step_penalty(
     detect(model, state.x, state.x, work)
     predict(model, state, work, damping_stages)
     if_any(work.contacts.n, _push, model, state, work, response)
-    impulse.record(work)
+    impulse.add_forces(work)
     drift(model, state, work, state.x)
 
 
@@ -45,7 +45,7 @@ def step_predicted(model: Model, state: State, work: Work, damping_stages: int) 
     broad_phase.refresh(model, state.x, work.x, work)
     detect(model, state.x, work.x, work)
     if_any(work.contacts.n, _push_apart, model, state, work)
-    impulse.record(work)
+    impulse.add_forces(work)
     drift(model, state, work, state.x)
 
 

@@ -15,7 +15,11 @@ def find_gaps(model: Model, x: wp.array, work: Work) -> None:
 
 
 def add_gaps(model: Model, x: wp.array, work: Work) -> None:
-    """The same, in addition to what was found before in this step."""
+    """The same, but what was to be closed or searched before in this step stays so.
+
+    Where impulses were exchanged twice, edges may have moved on since: the closure and its second
+    look then run although nothing overlaps at ``x``.
+    """
     c = work.contacts
     launch_over(
         kernels.residual_gaps,

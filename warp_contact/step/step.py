@@ -64,7 +64,7 @@ def step_overlapping(
 def in_overlap(model: Model, state: State, work: Work, iterations: int) -> None:
     """The rest of such a step."""
     narrow_phase.find_inner_vertices(model, state.x, work.x, work)
-    narrow_phase.forget_edges(work)  # none persists while bodies are moved apart
+    narrow_phase.clear_places(work)  # none persists while bodies are moved apart
     impulse.solve(model, state, work)
     drift(model, state, work, work.x)
     narrow_phase.find_inner_edges(model, state.x, work.x, work)

@@ -29,19 +29,18 @@ def close_gaps(model: Model, state: State, work: Work) -> None:
 
 def resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
     """Search the surface between bodies that overlapped before the step, then close the rest."""
-    if not on("search"):
-        return close_gaps(model, state, work)
     residual.add_gaps(model, state.x, work)
     if_any(work.surface.any_open, _resolve_overlaps, model, state, work, iterations)
 
 
 def close(model: Model, state: State, work: Work) -> None:
-    """Move ``state.x`` until every colliding vertex lies in the plane of its triangle.
+    """Move ``state.x`` until no contact overlaps, or as far as one call may move it.
 
-    Contacts that overlapped when the step began are left out. ``state.v`` changes only by what
-    keeps the angular momentum.
+    Vertices then lie in the planes of their triangles, edges on what they touch. Contacts that
+    overlapped when the step began are left out. ``state.v`` changes only by the torque that keeps
+    the angular momentum.
     """
-    _close(model, state, work, OLD_OVERLAP if on("old planes") else math.inf)
+    _close(model, state, work, OLD_OVERLAP)
 
 
 def close_all(model: Model, state: State, work: Work) -> None:
@@ -50,10 +49,11 @@ def close_all(model: Model, state: State, work: Work) -> None:
 
 
 def _close_gaps(model: Model, state: State, work: Work) -> None:
-    # No overlap can be older than the step. One that seems so has a wrong plane; the detection pass
-    # that follows may find a better one.
-    close(model, state, work)
-    # The closure may have moved vertices to other triangles, and edges across each other.
+    # No overlap is older than the step: one that seems so has a wrong plane, and the second look
+    # may find a better one.
+    (close if on("old planes") else close_all)(model, state, work)
+    # Vertices may now be at other triangles than before, and edges may cross that the narrow phase
+    # could not see.
     if on("second look"):
         detect_apart(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
@@ -61,12 +61,15 @@ def _close_gaps(model: Model, state: State, work: Work) -> None:
 
 
 def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
-    if_any(work.surface.any_old, search.balance, model, state.x, work, iterations)
-    close(model, state, work)
+    searched = on("search")
+    if searched:
+        if_any(work.surface.any_old, search.balance, model, state.x, work, iterations)
+    rest = close if searched else close_all
+    rest(model, state, work)
     if on("second look"):
         detect(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
-    if_any(work.surface.any_open, close, model, state, work)
+    if_any(work.surface.any_open, rest, model, state, work)
 
 
 def _close(model: Model, state: State, work: Work, deep: float) -> None:

@@ -1,0 +1,45 @@
+"""What a frame changes on the device, as it was when the frame began."""
+
+import warp as wp
+
+from warp_contact.data import contact_forces, warm_start
+from warp_contact.data.state import State
+from warp_contact.data.work import Work
+
+
+class FrameStart:
+    """Keeps the state, the impulses that its first step starts from, and the contact forces."""
+
+    def __init__(self, state: State, work: Work):
+        """Keep what is now."""
+        self._x, self._v = wp.clone(state.x), wp.clone(state.v)
+        self._warm = warm_start.copied(work.warm)
+        self._forces = contact_forces.copied(work.forces)
+
+    def keep(self, state: State, work: Work) -> None:
+        """Keep what is now; memory is allocated only where buffers have grown."""
+        if len(work.warm.edges) != len(self._warm.edges) or self.n_pair != work.capacity.pairs:
+            self.__init__(state, work)
+            return
+        wp.copy(self._x, state.x)
+        wp.copy(self._v, state.v)
+        warm_start.copy(self._warm, work.warm)
+        contact_forces.copy(self._forces, work.forces)
+
+    def go_back(self, state: State, work: Work) -> None:
+        """Restore the state and the warm start; ``work`` may have more room than there was."""
+        wp.copy(state.x, self._x)
+        wp.copy(state.v, self._v)
+        warm_start.copy(work.warm, self._warm)
+
+    def undo(self, state: State, work: Work) -> None:
+        """Restore all, as if the frame had not begun."""
+        self.go_back(state, work)
+        work.forces.pair_key.fill_(-1)
+        contact_forces.copy(work.forces, self._forces)
+        work.broad_phase.stale.fill_(1)
+
+    @property
+    def n_pair(self) -> int:
+        """Pairs of bodies that there was room for."""
+        return self._forces.pair_key.shape[0]

@@ -1,0 +1,24 @@
+"""The rates that limit the step, at the end of a frame, or what is wrong with its state."""
+
+import math
+
+import numpy as np
+
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.frame.diagnosis import flattest_tet, lost_vertex, vertex_name
+from warp_contact.frame.spectrum import Spectrum
+
+NO_RATES = math.inf, math.inf  # of a state that is lost
+
+
+def rates_now(model: Model, state: State, spectrum: Spectrum) -> tuple[tuple[float, float], str]:
+    """Rates of the present state [1/s], and what is wrong with it: empty where nothing is."""
+    lost = lost_vertex(state)
+    if lost is not None:
+        return NO_RATES, f"{vertex_name(model, lost)} is no longer finite"
+    rates = spectrum.rates(state.x)
+    if not np.isfinite(rates).all():
+        tet = flattest_tet(model, state.x)
+        return NO_RATES, f"stiffness is no longer finite, the flattest is {tet}"
+    return rates, ""

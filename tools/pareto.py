@@ -27,7 +27,7 @@ from engines.task import Failed, Task
 from measure import machine
 from measure.run import command_line, count, one_of
 
-TASKS = *closed_forms.TASKS, *scenes.PRESSED
+TASKS = *closed_forms.TASKS, *scenes.TITLES
 LIMIT, QUICK_LIMIT = 12.0, 6.0  # wall seconds of one run
 REPEATS = 3  # of everything, in turn; times are medians
 FEW = 5  # settings of each engine outside in the quick run
@@ -47,7 +47,7 @@ def main() -> int:
     parser.add_argument("--repeats", type=count, help=f"{REPEATS}, quick: 1")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="a table to draw again")
     args = parser.parse_args()
-    tasks = closed_forms.TASKS | {n: scenes.scene(n, args.quick) for n in scenes.PRESSED}
+    tasks = closed_forms.TASKS | {n: scenes.scene(n, args.quick) for n in scenes.TITLES}
     chosen = [tasks[name] for name in args.tasks or TASKS]
     titles = {panel.name: panel.title for _, panels in chosen for panel in panels}
     if args.draw:

@@ -71,9 +71,8 @@ def runs(
         yield setting.method, str(setting), motion
     for engine, rows in others.items():
         settings = [dict(zip(SWEEPS[engine][0], row, strict=True)) for row in rows]
-        for setting, motion in zip(
-            settings, outside(task, engine, settings, python, limit), strict=True
-        ):
+        motions = outside(task, engine, settings, python, limit)
+        for setting, motion in zip(settings, motions, strict=True):
             yield engine, ", ".join(f"{k} {value:g}" for k, value in setting.items()), motion
 
 
@@ -102,12 +101,12 @@ def outside(
 def plain(task: Task) -> SimpleNamespace:
     """The scene of a task as arrays, numbered through all bodies."""
     scene = task.scene()
-    faces = [(body.x, body.mesh.surface) for body in scene.bodies]
-    edges = [np.linalg.norm(x[f] - x[np.roll(f, 1, axis=1)], axis=2).mean() for x, f in faces]
+    sides = [b.x[b.mesh.surface] - b.x[np.roll(b.mesh.surface, 1, axis=1)] for b in scene.bodies]
+    edge = min(np.linalg.norm(s, axis=2).mean(axis=1).mean() for s in sides)
     return SimpleNamespace(
         **vars(Numbered(scene)),
         x=task.start(scene),  # (n, 3) [m]
-        edge=float(min(edges)),  # mean one of the surface of the finest body [m]
+        edge=float(edge),  # mean one of the surface of the finest body [m]
         bodies=[
             SimpleNamespace(lame=b.material.lame(), tets=b.mesh.tets, **asdict(b.material))
             for b in scene.bodies

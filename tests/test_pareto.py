@@ -110,10 +110,10 @@ def test_a_run_that_failed_is_a_point_with_its_reason_in_every_panel():
         raise Failed("bodies apart")
 
     panels = [Panel("A", "title", lambda *_: 0.5), Panel("B", "title", broken)]
-    found = list(pareto.judge(blocks(), panels, ("m", "1", Motion(wall=3.0, reason="too slow"))))
+    found = list(pareto.judge(blocks(), panels, "m", "1", Motion(wall=3.0, reason="too slow")))
     assert [(p.panel, p.outcome, p.wall) for p in found] == [(n, "too slow", 3.0) for n in "AB"]
     motion = Motion(None, None, "", 1.0, 0.25, 3)
-    first, second = pareto.judge(blocks(), panels, ("m", "1", motion))
+    first, second = pareto.judge(blocks(), panels, "m", "1", motion)
     assert (first.error, first.outcome, first.startup) == (0.5, "ok", 0.25)
     assert (second.error, second.outcome, second.startup) == (None, "bodies apart", 0.25)
 

@@ -13,7 +13,6 @@ pictures of a table again, beside it.
 """
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -22,8 +21,8 @@ from chart import closed_forms, points, scenes
 from chart.panel import Panel
 from chart.points import Point
 from engines import ours
-from engines.runs import SWEEPS, Run, runs, versions
-from engines.task import Failed, Task
+from engines.runs import SWEEPS, runs, versions
+from engines.task import Failed, Motion, Task
 from measure import machine
 from measure.run import command_line, count, one_of
 
@@ -60,7 +59,7 @@ def main() -> int:
         rounds.append([])
         for task, panels in chosen:
             for run in runs(task, own, others, args.python, limit):
-                rounds[-1] += judge(task, panels, run)
+                rounds[-1] += judge(task, panels, *run)
         # After every round: a long run leaves what it has.
         found = choose([middle(same) for same in zip(*rounds, strict=True)])
         head = HEAD.format(len(rounds), perf_counter() - begin, machine.line("cpu"), outside)
@@ -73,9 +72,8 @@ def main() -> int:
     return 0
 
 
-def judge(task: Task, panels: list[Panel], run: Run) -> Iterator[Point]:
-    """The errors of a run in all panels, printed as they come."""
-    method, setting, motion = run
+def judge(task: Task, panels: list[Panel], method: str, setting: str, motion: Motion):
+    """The points of a run in all panels, printed as they come."""
     for panel in panels:
         error, outcome = None, motion.reason
         try:
@@ -90,8 +88,8 @@ def judge(task: Task, panels: list[Panel], run: Run) -> Iterator[Point]:
 
 def middle(same: tuple[Point, ...]) -> Point:
     """Repeats of a point as one; a run that fails once has failed."""
-    failed = next((p for p in same if p.error is None), None)
-    return failed or same[0]._replace(wall=median(p.wall for p in same))
+    failed = [p for p in same if p.error is None]
+    return failed[0] if failed else same[0]._replace(wall=median(p.wall for p in same))
 
 
 def choose(found: list[Point]) -> list[Point]:

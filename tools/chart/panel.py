@@ -20,8 +20,6 @@ from verification.setup import gradients
 
 import warp_contact as wc
 
-LAST = 0.1  # part of the frames at the end over which a state of rest is averaged
-
 
 class Elastic(Numbered):
     """The bodies of a scene as linear tets under one law."""
@@ -71,9 +69,6 @@ class Panel(NamedTuple):
     error: Callable[[Task, Motion], float]  # of a motion; raises ``Failed``
 
 
-Shown = tuple[Task, list[Panel]]
-
-
 def sound(task: Task, motion: Motion) -> Elastic:
     """The bodies under the law that the engine simulates; ``Failed`` where tets end inverted."""
     solid = Elastic(task.scene(), motion.law)
@@ -83,6 +78,6 @@ def sound(task: Task, motion: Motion) -> Elastic:
     return solid
 
 
-def late(task: Task, part: float = LAST) -> slice:
-    """The frames at the end, two at least."""
+def late(task: Task, part: float = 0.1) -> slice:
+    """The frames at the end, two at least; over a tenth of all a state of rest is averaged."""
     return slice(-max(2, round(part * task.frames)), None)

@@ -20,7 +20,7 @@ from verification.setup import mean_edge
 
 import warp_contact as wc
 from chart.distance import distance
-from chart.panel import Panel, Shown, late, sound
+from chart.panel import Panel, late, sound
 from warp_contact import scenes
 
 FPS = 60
@@ -37,7 +37,7 @@ PRESSED = [("lower_cube", "sphere"), ("sphere", "upper_cube")]
 PRESSED += [("membrane", f"cube_{mass}") for mass in (1, 4, 16)]
 
 
-def scene(name: str, quick: bool) -> Shown:
+def scene(name: str, quick: bool) -> tuple[Task, list[Panel]]:
     """A scene of the paper: overlap and gap, its overlap alone, its motion."""
     module, title = scenes.load(name), TITLES[name] + "\n{} [of an edge]"
     frames = round((QUICK if quick else DURATION) * FPS)

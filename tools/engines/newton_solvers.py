@@ -109,10 +109,8 @@ class Engine:
             state.particle_q.assign(scene.x.astype(np.float32))
             state.particle_qd.assign((scene.v - held).astype(np.float32))
         self.held = wp.array(held, dtype=wp.vec3, device="cpu")
-        self.control = model.control()
-        self.pipeline = newton.CollisionPipeline(model)
-        self.contacts = self.pipeline.contacts()
-        self.graph = None
+        self.control, self.pipeline = model.control(), newton.CollisionPipeline(model)
+        self.contacts, self.graph = self.pipeline.contacts(), None
 
     def step_frame(self) -> None:
         """One frame; the first is stepped as it is and captured for the others."""

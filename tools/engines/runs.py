@@ -18,7 +18,6 @@ import numpy as np
 from engines import ours
 from engines.task import Motion, Numbered, Task
 
-Run = tuple[str, str, Motion]  # method, its knobs as text, what came of it
 ENGINES = {  # their adapters and their laws of elasticity
     "Newton VBD": ("newton_solvers.py", "neo-hookean"),
     "Newton XPBD": ("newton_solvers.py", "neo-hookean"),
@@ -52,13 +51,14 @@ for p in "newton", "mujoco", "warp-lang":
 
 def runs(
     task: Task, own: Iterable[ours.Own], others: dict[str, Iterable], python: str, limit: float
-) -> Iterator[Run]:
-    """Every setting of our own and of the ``others``, whose engines the interpreter ``python`` has.
+) -> Iterator[tuple[str, str, Motion]]:
+    """Method, knobs as text and motion of all our ``own`` settings and those of the ``others``.
 
-    The others are rows of ``SWEEPS``. A run is given up after ``limit`` wall seconds. Steps of our
-    own are multiples of those that the same method takes by itself.
+    The others are rows of ``SWEEPS``, their engines those of the interpreter ``python``. A run is
+    given up after ``limit`` wall seconds. Steps of our own are multiples of those that the same
+    method takes by itself.
     """
-    steps: dict[tuple, int | None] = {}
+    steps = {}
     for setting in own:
         alike = setting.method, setting.times
         if setting.factor == 1:

@@ -63,8 +63,8 @@ def test_every_setting_has_a_value_for_each_knob():
     import race
     from engines import runs
 
-    for engine, (knobs, rows) in runs.SWEEPS.items():
-        assert all(len(row) == len(knobs) for row in rows)
-        assert len(set(rows)) == len(rows) == 10 > pareto.FEW
+    for engine, settings in runs.SWEEPS.items():
+        rows = {tuple(setting.values()) for setting in settings}
+        assert len(rows) == len(settings) == 10 > pareto.FEW
         assert set(race.SETTINGS[engine]) <= set(range(10))
     assert set(race.SETTINGS) == set(runs.SWEEPS) == set(runs.ENGINES)

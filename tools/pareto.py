@@ -53,7 +53,7 @@ def main() -> int:
         draw(args.draw.parent, titles, points.read(args.draw))
         return 0
     own, few, limit = (ours.QUICK, FEW, QUICK_LIMIT) if args.quick else (ours.ALL, None, LIMIT)
-    others = {engine: rows[:few] for engine, (_, rows) in SWEEPS.items()}
+    others = {engine: settings[:few] for engine, settings in SWEEPS.items()}
     begin, rounds, outside = perf_counter(), [], versions(args.python)
     for _ in range(args.repeats or (1 if args.quick else REPEATS)):
         rounds.append([])

@@ -63,7 +63,7 @@ def main() -> int:
     for name in args.scenes or RACES:
         build, seconds, count = RACES[name]
         task = Task(build, FPS, round(seconds * FPS))
-        others = {e: [SWEEPS[e][1][k] for k in rows[:count]] for e, rows in SETTINGS.items()}
+        others = {e: [SWEEPS[e][k] for k in rows[:count]] for e, rows in SETTINGS.items()}
         for engine, _, motion in runs(task, [DEFAULT], others, args.python, LIMIT):
             who = "warp_contact" if engine == DEFAULT.method else engine
             print(TABLE.line(name, who, *cells(task, motion)), flush=True)

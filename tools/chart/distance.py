@@ -19,7 +19,12 @@ def distance(xa: np.ndarray, ta: np.ndarray, xb: np.ndarray, tb: np.ndarray) -> 
     a, b = ((x[np.unique(tris)], x[edges(tris)], x[tris]) for x, tris in surfaces)
     near = segments_segments(a[1], b[1])
     for (points, segments, _), (_, _, triangles) in ((a, b), (b, a)):
-        if crosses(segments, triangles):
+        start, end = segments[:, None, 0], segments[:, None, 1]
+        low, high = over(start, triangles)[0], over(end, triangles)[0]
+        through = low * high < 0.0
+        at = low / np.where(through, low - high, 1.0)
+        _, inside = over(start + at[..., None] * (end - start), triangles)
+        if (through & inside).any():
             return 0.0
         # Points that face no inside are at best as near as an edge.
         height, inside = over(points[:, None], triangles)
@@ -39,15 +44,6 @@ def over(p: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     area2 = _dot(n, n)
     s, r = _dot(np.cross(d, v), n) / area2, _dot(np.cross(u, d), n) / area2
     return _dot(d, n) / np.sqrt(area2), (s >= 0.0) & (r >= 0.0) & (s + r <= 1.0)
-
-
-def crosses(p: np.ndarray, t: np.ndarray) -> bool:
-    """Whether any segment, shape (n, 2, 3), goes through any triangle, shape (m, 3, 3)."""
-    start, end = p[:, None, 0], p[:, None, 1]
-    low, high = over(start, t)[0], over(end, t)[0]
-    through = low * high < 0.0
-    s = low / np.where(through, low - high, 1.0)
-    return bool((through & over(start + s[..., None] * (end - start), t)[1]).any())
 
 
 def segments_segments(p: np.ndarray, q: np.ndarray) -> float:

@@ -23,25 +23,29 @@ ENGINES = {  # their adapters and their laws of elasticity
     "Newton XPBD": ("newton_solvers.py", "neo-hookean"),
     "MuJoCo flex": ("mujoco_flex.py", "st-venant"),
 }
-SWEEPS = {  # knobs, which the adapters explain, and their values
-    "Newton VBD": (
-        ("steps", "iterations", "contact", "margin"),
-        ((2, 5, 1, 0.1), (5, 5, 1, 0.1), (2, 5, 10, 0.002), (5, 5, 10, 0.02), (5, 5, 10, 0.002))
-        + ((10, 10, 1, 0.1), (10, 10, 10, 0.02), (10, 10, 10, 0.002), (20, 20, 10, 0.002))
-        + ((5, 5, 1, 0.02),),
-    ),
-    "Newton XPBD": (
-        ("steps", "iterations", "relaxation", "radius"),
-        ((5, 10, 0.2, 0.3), (10, 2, 0.2, 0.3), (10, 10, 0.2, 0.3), (5, 10, 0.2, 0.43))
-        + ((10, 10, 0.2, 0.43), (10, 20, 0.1, 0.3), (32, 2, 0.2, 0.3), (32, 10, 0.4, 0.3))
-        + ((10, 2, 0.2, 0.43), (20, 10, 0.1, 0.43)),
-    ),
-    "MuJoCo flex": (
-        ("steps", "iterations", "time_constant", "radius"),
-        ((1, 20, 2, 0.01), (2, 20, 2, 0.01), (4, 20, 2, 0.01), (2, 20, 2, 1e-4), (4, 20, 2, 1e-4))
-        + ((8, 20, 2, 0.01), (16, 20, 2, 0.01), (8, 20, 2, 1e-4), (16, 20, 2, 1e-4))
-        + ((16, 100, 10, 0.01),),
-    ),
+KNOBS = {  # and their values, setting by setting; the adapters explain them
+    "Newton VBD": {
+        "steps": (2, 5, 2, 5, 5, 10, 10, 10, 20, 5),
+        "iterations": (5, 5, 5, 5, 5, 10, 10, 10, 20, 5),
+        "contact": (1, 1, 10, 10, 10, 1, 10, 10, 10, 1),
+        "margin": (0.1, 0.1, 0.002, 0.02, 0.002, 0.1, 0.02, 0.002, 0.002, 0.02),
+    },
+    "Newton XPBD": {
+        "steps": (5, 10, 10, 5, 10, 10, 32, 32, 10, 20),
+        "iterations": (10, 2, 10, 10, 10, 20, 2, 10, 2, 10),
+        "relaxation": (0.2, 0.2, 0.2, 0.2, 0.2, 0.1, 0.2, 0.4, 0.2, 0.1),
+        "radius": (0.3, 0.3, 0.3, 0.43, 0.43, 0.3, 0.3, 0.3, 0.43, 0.43),
+    },
+    "MuJoCo flex": {
+        "steps": (1, 2, 4, 2, 4, 8, 16, 8, 16, 16),
+        "iterations": (20, 20, 20, 20, 20, 20, 20, 20, 20, 100),
+        "time_constant": (2, 2, 2, 2, 2, 2, 2, 2, 2, 10),
+        "radius": (0.01, 0.01, 0.01, 1e-4, 1e-4, 0.01, 0.01, 1e-4, 1e-4, 0.01),
+    },
+}
+SWEEPS = {
+    engine: [dict(zip(knobs, row, strict=True)) for row in zip(*knobs.values(), strict=True)]
+    for engine, knobs in KNOBS.items()
 }
 GRACE = 300.0  # seconds for imports and kernels, on top of the limits of the runs
 VERSIONS = """from importlib import metadata as m
@@ -50,11 +54,11 @@ for p in "newton", "mujoco", "warp-lang":
 
 
 def runs(
-    task: Task, own: Iterable[ours.Own], others: dict[str, Iterable], python: str, limit: float
+    task: Task, own: Iterable[ours.Own], others: dict[str, list], python: str, limit: float
 ) -> Iterator[tuple[str, str, Motion]]:
     """Method, knobs as text and motion of all our ``own`` settings and those of the ``others``.
 
-    The others are rows of ``SWEEPS``, their engines those of the interpreter ``python``. A run is
+    The others are parts of ``SWEEPS``, their engines those of the interpreter ``python``. A run is
     given up after ``limit`` wall seconds. Steps of our own are multiples of those that the same
     method takes by itself.
     """
@@ -69,8 +73,7 @@ def runs(
         else:
             motion = Motion(reason="no run with steps x1")
         yield setting.method, str(setting), motion
-    for engine, rows in others.items():
-        settings = [dict(zip(SWEEPS[engine][0], row, strict=True)) for row in rows]
+    for engine, settings in others.items():
         motions = outside(task, engine, settings, python, limit)
         for setting, motion in zip(settings, motions, strict=True):
             yield engine, ", ".join(f"{k} {value:g}" for k, value in setting.items()), motion

@@ -50,7 +50,7 @@ def main() -> int:
     chosen = [tasks[name] for name in args.tasks or TASKS]
     titles = {panel.name: panel.title for _, panels in chosen for panel in panels}
     if args.draw:
-        draw(args.draw.parent, titles, points.read(args.draw))
+        draw(args.draw.parent, titles, shown(points.read(args.draw)))
         return 0
     own, few, limit = (ours.QUICK, FEW, QUICK_LIMIT) if args.quick else (ours.ALL, None, LIMIT)
     others = {engine: settings[:few] for engine, settings in SWEEPS.items()}
@@ -61,14 +61,14 @@ def main() -> int:
             for run in runs(task, own, others, args.python, limit):
                 rounds[-1] += judge(task, panels, *run)
         # After every round: a long run leaves what it has.
-        found = choose([middle(same) for same in zip(*rounds, strict=True)])
+        found = [middle(same) for same in zip(*rounds, strict=True)]
         head = HEAD.format(len(rounds), perf_counter() - begin, machine.line("cpu"), outside)
         args.out.mkdir(parents=True, exist_ok=True)
         points.write(args.out / "pareto.csv", found)
-        text = points.report(head, titles, found)
+        text = points.report(head, titles, shown(found))
         (args.out / "pareto.txt").write_text(text, encoding="utf-8")
         print(text)
-        draw(args.out, titles, found)
+        draw(args.out, titles, shown(found))
     return 0
 
 
@@ -92,16 +92,14 @@ def middle(same: tuple[Point, ...]) -> Point:
     return failed[0] if failed else same[0]._replace(wall=median(p.wall for p in same))
 
 
-def choose(found: list[Point]) -> list[Point]:
-    """Of the penalties of a panel, show those with the best stiffness only."""
+def shown(found: list[Point]) -> list[Point]:
+    """Of the penalties of a panel those with the best stiffness only, and everything else."""
     penalties = [p for p in found if p.method == "penalty" and p.error is not None]
     worst_first = sorted(penalties, key=points.BY_ERROR, reverse=True)
     best = {p.panel: p.setting.partition("steps")[0] for p in worst_first}
-
-    def shown(p: Point) -> bool:
-        return p.method != "penalty" or p.setting.startswith(best.get(p.panel, ""))
-
-    return [p._replace(shown="yes" if shown(p) else "no") for p in found]
+    return [
+        p for p in found if p.method != "penalty" or p.setting.startswith(best.get(p.panel, ""))
+    ]
 
 
 def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:

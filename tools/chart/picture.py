@@ -41,7 +41,7 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
     for ax in axes.flat[len(titles) :]:
         ax.set_visible(False)
     for ax, (name, title) in zip(axes.flat, titles.items(), strict=False):
-        panel(ax, title, [p for p in points if p.panel == name and p.shown == "yes"])
+        panel(ax, title, [p for p in points if p.panel == name])
     handles = []
     for method in dict.fromkeys(p.method for p in points):
         colour, marker, label = STYLES.get(method, OTHER)

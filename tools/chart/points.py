@@ -5,8 +5,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
-HEAD = "panel", "method", "setting", "wall s per simulated s", "error", "outcome"
-HEAD += "start-up s", "shown"
+HEAD = "panel", "method", "setting", "wall s per simulated s", "error", "outcome", "start-up s"
 BY_WALL, BY_ERROR = attrgetter("wall"), attrgetter("error")
 COMPARED = (  # times of all methods at equal errors, errors at equal times
     ("error at most {:g}", (0.05, 0.01, 0.001), BY_ERROR, BY_WALL, "{p.method} {p.wall:.3g} s"),
@@ -24,7 +23,6 @@ class Point(NamedTuple):
     error: float | None = None  # None where the run has failed
     outcome: str = "ok"  # or the reason why there is no error
     startup: float | None = None  # seconds up to the end of the first frame: build, compile or load
-    shown: str = "yes"  # in the pictures and words; of penalties only the best stiffness is
 
 
 def write(path: Path, points: list[Point]) -> None:
@@ -38,9 +36,9 @@ def read(path: Path) -> list[Point]:
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))[1:]
     found = []
-    for *names, wall, error, outcome, startup, shown in rows:
+    for *names, wall, error, outcome, startup in rows:
         wall, error, startup = (float(n) if n else None for n in (wall, error, startup))
-        found.append(Point(*names, wall, error, outcome, startup, shown))
+        found.append(Point(*names, wall, error, outcome, startup))
     return found
 
 
@@ -61,7 +59,7 @@ def report(head: str, titles: dict[str, str], points: list[Point]) -> str:
     """All panels, after ``head``: machine, versions, date."""
     parts = [head]
     for name, title in titles.items():
-        mine = [p for p in points if p.panel == name and p.shown == "yes"]
+        mine = [p for p in points if p.panel == name]
         parts.append("\n".join([title.replace("\n", ": "), *panel(mine)]))
     return "\n\n".join(parts) + "\n"
 

@@ -52,7 +52,7 @@ def place(task: Task, motion: Motion) -> float:
     parts, bodies = sound(task, motion).parts, task.scene().bodies
     faces = [on_face(body.mesh, 2, side) for body, side in zip(bodies, (1, -1), strict=True)]
     z = [motion.x[late(task), p, 2][:, face].mean() for p, face in zip(parts, faces, strict=True)]
-    return float(np.abs(np.array(z) - MEETING[motion.law]).max() / OVERLAP)
+    return float(np.abs(np.array(z, dtype=float) - MEETING[motion.law]).max() / OVERLAP)
 
 
 # A3: the cap of a sphere pressed onto a plane by a given depth.

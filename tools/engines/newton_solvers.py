@@ -149,4 +149,4 @@ class Engine:
 
 
 if __name__ == "__main__":
-    main({"Newton VBD": vbd, "Newton XPBD": xpbd}[sys.argv[2]])
+    main({"Newton VBD": vbd, "Newton XPBD": xpbd}[sys.argv[1]])

@@ -8,7 +8,7 @@ INTERVAL = 0.1  # between two writes of the line [s]
 
 
 class Progress:
-    """Frame, time, contacts, deepest overlap and time to go, on one line of a terminal.
+    """Frame, time, steps, contacts, deepest overlap and time to go, on one line of a terminal.
 
     Nothing is written where the stream is not a terminal, or when ``quiet``.
     """
@@ -22,15 +22,8 @@ class Progress:
         self.start = self.written = time.monotonic()
         self._write(f"frame 0/{n_frames}")
 
-    def update(self, frame: int, seconds: float, n_contacts: int, overlap: float) -> None:
-        """Count a finished frame.
-
-        Args:
-            frame: its number
-            seconds: time in the scene [s]
-            n_contacts: contacts in its last step
-            overlap: deepest overlap after it [m]
-        """
+    def update(self, sim, measured) -> None:
+        """Count a finished frame of a simulation, and what was measured of it."""
         self.done += 1
         now = time.monotonic()
         last = self.done == self.n_frames
@@ -39,9 +32,9 @@ class Progress:
         self.written = now
         left = (now - self.start) / self.done * (self.n_frames - self.done)
         self._write(
-            f"frame {frame} ({self.done}/{self.n_frames})  t {seconds:.3f} s  "
-            f"{n_contacts} contacts  overlap {overlap:.1e} m  "
-            + ("done" if last else f"{clock(left)} to go")
+            f"frame {sim.frame} ({self.done}/{self.n_frames})  t {sim.time:.3f} s  "
+            f"{sim.substeps} steps  {measured.n_contacts} contacts  "
+            f"overlap {measured.overlap:.1e} m  " + ("done" if last else f"{clock(left)} to go")
         )
 
     def close(self) -> None:

@@ -40,6 +40,7 @@ class Simulation:
         substeps: int | None = None,
         device: str | None = None,
         sleeping: bool = False,
+        max_substeps: int = 50_000,
     ):
         """Lay out a scene.
 
@@ -52,6 +53,7 @@ class Simulation:
             device: ``cpu``, ``cuda:0``, ...; None takes Warp's default
             sleeping: under gravity, islands at rest are left alone until something comes near: a
                 settled pile costs next to nothing, at an accuracy that ``frame/sleeping.py`` states
+            max_substeps: a frame that needs more of them ends the run, with its reason
 
         Raises:
             ValueError: for an empty scene, an unknown device or response, fps or substeps that are
@@ -61,6 +63,8 @@ class Simulation:
             raise ValueError(f"fps {fps} is not positive")
         if substeps is not None and (int(substeps) != substeps or substeps < 1):
             raise ValueError(f"substeps {substeps} is not a positive count")
+        if int(max_substeps) != max_substeps or max_substeps < 1:
+            raise ValueError(f"max_substeps {max_substeps} is not a positive count")
         self.scene = scene
         self.response = _checked(ContactSurface() if response is None else response)
         self.fps = fps
@@ -70,7 +74,7 @@ class Simulation:
             self.model, self.state = assemble(scene)
             scene.freeze()
             load_kernels(self.model, self.device)
-            settings = self.response, fps, substeps, sleeping
+            settings = self.response, fps, substeps, max_substeps, sleeping
             self._stepper = Stepper(self.model, self.state, *settings)
             self._meter = Meter(self.model)
 
@@ -96,7 +100,7 @@ class Simulation:
                 self.step_frame()
                 if progress:
                     measured = self.measure()
-                    line.update(self.frame, self.time, measured.n_contacts, measured.overlap)
+                    line.update(self, measured)
                 yield self.frame
 
     def step_frame(self) -> None:

@@ -65,6 +65,16 @@ def multiply(
     part[k] = s
 
 
+@wp.func
+def mass_norm2(m: float, y: wp.vec3) -> wp.float64:
+    """M y . y, in double precision where it is too large for a float32: small, stiff bodies."""
+    p = m * wp.dot(y, y)
+    if wp.isfinite(p):
+        return wp.float64(p)
+    z = wp.vec3d(wp.float64(y[0]), wp.float64(y[1]), wp.float64(y[2]))
+    return wp.float64(m) * wp.dot(z, z)
+
+
 @wp.kernel
 def orthogonalise(
     # in
@@ -88,7 +98,7 @@ def orthogonalise(
             y -= float(coef[2 * j + 1, b]) * basis[j, i]
         if j > 0:
             y -= float(wp.sqrt(coef[2 * j, b])) * basis[j - 1, i]
-        s += wp.float64(mass[i] * wp.dot(y, y))
+        s += mass_norm2(mass[i], y)
         basis[j + 1, i] = y
     part[k] = s
 

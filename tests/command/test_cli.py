@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -214,16 +215,26 @@ class Terminal(io.StringIO):
         return True
 
 
+def at(frame: int, time: float) -> SimpleNamespace:
+    """What the progress line reads of a simulation."""
+    return SimpleNamespace(frame=frame, time=time, substeps=7)
+
+
+def found(n_contacts: int, overlap: float) -> SimpleNamespace:
+    """What it reads of a measurement."""
+    return SimpleNamespace(n_contacts=n_contacts, overlap=overlap)
+
+
 def test_progress_is_one_line_on_a_terminal():
     stream = Terminal()
     announce("loading", stream=stream)
     with Progress(2, stream=stream) as line:
-        line.update(1, 1 / 60, 12, 3.4e-5)
-        line.update(2, 2 / 60, 9, 0.0)
+        line.update(at(1, 1 / 60), found(12, 3.4e-5))
+        line.update(at(2, 2 / 60), found(9, 0.0))
     text = stream.getvalue()
     assert text.startswith("loading\n")
     assert text.count("\n") == 2
-    assert "frame 1 (1/2)  t 0.017 s  12 contacts  overlap 3.4e-05 m  0:00 to go" in text
+    assert "frame 1 (1/2)  t 0.017 s  7 steps  12 contacts  overlap 3.4e-05 m  0:00 to go" in text
     assert text.rstrip().endswith("done")
 
 
@@ -231,7 +242,7 @@ def test_progress_is_one_line_on_a_terminal():
 def test_progress_is_silent_without_a_terminal_or_when_quiet(stream):
     announce("loading", quiet=stream.isatty(), stream=stream)
     with Progress(1, quiet=stream.isatty(), stream=stream) as line:
-        line.update(1, 0.1, 0, 0.0)
+        line.update(at(1, 0.1), found(0, 0.0))
     assert stream.getvalue() == ""
 
 

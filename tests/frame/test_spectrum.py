@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 import warp as wp
 
+from warp_contact import Scene, Simulation
+from warp_contact import box as block
 from warp_contact.frame import spectrum as spectrum_file
 from warp_contact.frame.spectrum import Spectrum
 from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork
@@ -217,3 +219,18 @@ def test_rates_without_bound_are_not_kept(blob, build_model):
     spectrum = Spectrum(build_model((x, tets, MATERIALS[0])))
     assert spectrum.rates(wp.array(1e30 * x, dtype=wp.vec3))[0] == np.inf
     assert np.isfinite(spectrum.rates(wp.array(x, dtype=wp.vec3))[0])
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-5, 1e-6])
+def test_small_and_stiff_bodies_have_the_frequencies_of_large_ones(size):
+    """Of steel: omega is a speed of sound over a length, whatever the length."""
+    scenes = []
+    for edge in (1.0, size):
+        scene = Scene(gravity=(0.0, 0.0, 0.0))
+        scene.add_body(block(edge, 2), NeoHookean(2e11, 0.3, 7800.0))
+        scenes.append(Simulation(scene, fps=5e3 / edge))
+    whole, small = (sim._stepper.spectrum.omega(sim.state.x) for sim in scenes)
+    assert small * size == pytest.approx(whole, rel=1e-3)  # what the bound is known to
+    for sim in scenes:
+        sim.step_frame()
+    assert scenes[0].substeps == scenes[1].substeps

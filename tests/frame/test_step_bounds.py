@@ -104,3 +104,24 @@ def test_bodies_of_other_worlds_are_not_fast_against_each_other():
     sim(0, 1).step_frame()
     with pytest.raises(SimulationError, match=r"substeps=64 is too few: bodies move 0\.0104 m"):
         sim(0, 0).step_frame()
+
+
+@pytest.mark.parametrize(
+    ("density", "speed", "words"),
+    [
+        (0.01, 0.0, "body 'block' vibrates at .* check density"),
+        (1000.0, 1e5, "body 'block' moves at up to .* check its velocity"),
+    ],
+)
+def test_a_frame_that_would_take_for_ever_ends_the_run_with_its_reason(density, speed, words):
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    soft = NeoHookean(1e5, 0.3, 1000.0)
+    scene.add_body(box(0.1, 2), soft, (1.0, 0.0, 0.0), label="other")
+    material = NeoHookean(1e5, 0.3, density)
+    scene.add_body(box(0.1, 2), material, velocity=(-speed, 0.0, 0.0), label="block")
+    sim = Simulation(scene, max_substeps=2000)
+    with pytest.raises(SimulationError, match=f"frame 1 needs .* max_substeps=2000: {words}"):
+        sim.step_frame()
+    assert sim.frame == 0
+    with pytest.raises(ValueError, match="max_substeps 0 is not a positive count"):
+        Simulation(scene, max_substeps=0)

@@ -102,6 +102,8 @@ def add_run(group) -> None:
     )
     add("--device", metavar="NAME", help="cpu, cuda:0, ...; default: Warp's")
     add("--substeps", type=count, metavar="N", help="steps a frame; default: automatic")
+    limit = "end the run where a frame needs more steps (50000)"
+    add("--max-substeps", type=count, metavar="N", default=50_000, help=limit)
     add("--fps", type=positive, default=60.0, help="frames a second; default: %(default)g")
     add(
         "--set",

@@ -65,6 +65,7 @@ def simulation(module, scene: Scene, args) -> Simulation:
         response(module, args),
         fps=args.fps,
         substeps=args.substeps,
+        max_substeps=args.max_substeps,
         device=args.device,
         sleeping=args.sleep,
     )
@@ -80,7 +81,7 @@ def take_frames(sim: Simulation, n: int, writer: UsdWriter, log, saved: Path, ar
         last = time.monotonic()
         for frame in sim.frames(left):
             measured = record(sim, writer, log)
-            line.update(frame, sim.time, measured.n_contacts, measured.overlap)
+            line.update(sim, measured)
             if frame == n or time.monotonic() - last >= SAVE_EVERY:
                 sim.save(saved)
                 last = time.monotonic()

@@ -100,6 +100,11 @@ class Spectrum:
         allowed = np.where(slow, MUCH, LITTLE)
         return bool(np.isfinite(most).all() and (change <= allowed).all())
 
+    @property
+    def stiffest(self) -> int:
+        """The body with the largest frequency, where ``rates`` were last asked for."""
+        return int(self._of_bodies[0].argmax())
+
     def omega(self, x: wp.array) -> float:
         """Angular frequency [1/s] of the fastest mode at the positions ``x`` [m].
 

@@ -16,6 +16,7 @@ class StepCount:
     Attributes:
         fps: frames per second
         wanted: steps in a frame that the user chose, or None
+        most: steps in a frame that are taken if the user chose none
     """
 
     def __init__(
@@ -24,10 +25,12 @@ class StepCount:
         response: ContactSurface | Penalty | PredictedForce,
         fps: float,
         wanted: int | None,
+        most: int,
     ):
         """Read sizes and worlds of the bodies once."""
         self.fps = fps
         self.wanted = wanted
+        self.most = most
         self._model = model
         self._response = response
         self._leaves = not isinstance(response, ContactSurface) or response.search == "literal"
@@ -37,18 +40,21 @@ class StepCount:
         self._world = of_bodies[model.vert_body.numpy()]
         self._largest_inv_mass = float(model.inv_mass.numpy().max())
 
-    def steps(self, state: State, omega: float, last: int, frame: int, overlapping: bool) -> int:
+    def steps(
+        self, state: State, omega: float, stiffest: int, last: int, frame: int, overlapping: bool
+    ) -> int:
         """Steps of frame number ``frame``, after one of ``last`` steps.
 
         Args:
             state: at its start
             omega: largest frequency of the elastic forces [1/s]
+            stiffest: the body with that frequency
             last: steps of the frame before
             frame: its number, for the message
             overlapping: whether there may be overlaps that no step created
 
         Raises:
-            SimulationError: no step is stable
+            SimulationError: no step is stable, or more than ``most`` are needed
         """
         if not np.isfinite(omega):
             tet = flattest_tet(self._model, state.x)
@@ -58,7 +64,31 @@ class StepCount:
         omega, speed = self._with_response(omega), self._speed(state)
         sizes = self._thickness, self._edge
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlapping or self._leaves)
-        return step_bounds.steps_in_frame(per_second, self.fps, last)
+        n = step_bounds.steps_in_frame(per_second, self.fps, last)
+        if n > self.most:
+            cause = self._of_stiffness(state, stiffest, omega)
+            if per_second > step_bounds.PATIENCE * omega:  # the speed asks for them
+                cause = self._of_speed(state, speed)
+            few = f"max_substeps={self.most}"
+            raise SimulationError(f"frame {frame} needs {n} substeps, more than {few}: {cause}")
+        return n
+
+    def _of_stiffness(self, state: State, body: int, omega: float) -> str:
+        """Why a step is short, and what to do, where vibrations limit it."""
+        if isinstance(self._response, Penalty):
+            stiffness = self._response.stiffness
+            return f"a penalty of {stiffness:g} N/m is too stiff for the lightest vertex"
+        name = f"body '{self._model.labels[body]}'"
+        flattest = f"the flattest tet is {flattest_tet(self._model, state.x)}"
+        remedy = "check density [kg/m^3], modulus [Pa], size [m] and tets, or raise max_substeps"
+        return f"{name} vibrates at {omega / (2.0 * np.pi):.3g} Hz ({flattest}); {remedy}"
+
+    def _of_speed(self, state: State, speed: float) -> str:
+        """The same where motion limits it."""
+        vertex = int(np.linalg.norm(state.v.numpy(), axis=1).argmax())
+        name = f"body '{self._model.labels[self._model.vert_body.numpy()[vertex]]}'"
+        remedy = "check its velocity [m/s], or raise max_substeps"
+        return f"{name} moves at up to {speed:.3g} m/s against others; {remedy}"
 
     def check(self, state: State, omega: float, frame: int) -> None:
         """Refuse steps that the user chose too long; the motion in a step counts in frame 1 only.

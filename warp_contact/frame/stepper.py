@@ -63,6 +63,7 @@ class Stepper:
         response: ContactSurface | Penalty | PredictedForce,
         fps: float,
         wanted: int | None,
+        most: int,
         sleeping: bool,
     ):
         """Allocate what the steps need, on the current device."""
@@ -72,7 +73,7 @@ class Stepper:
         self.rates: tuple[float, float] | None = None
         self.overlapping: bool | None = None
         self._model, self._state, self._response = model, state, response
-        self._step_count = StepCount(model, response, fps, wanted)
+        self._step_count = StepCount(model, response, fps, wanted, most)
         self.spectrum = Spectrum(model)
         # Without gravity, a slow body may be in free flight, not at rest.
         may_sleep = sleeping and any(model.gravity)
@@ -94,8 +95,7 @@ class Stepper:
 
         Whatever ends it early, an interrupt too, leaves all as the last frame had left it.
 
-        Raises:
-            SimulationError: no step is stable, or the state does not stay finite
+        Raises SimulationError where no step is stable or the state does not stay finite.
         """
         self._begin()
         try:
@@ -231,7 +231,8 @@ class Stepper:
             work.forces.received.zero_()
             work.forces.pair_key.fill_(-1)
             work.forces.pair_total.zero_()
-        n = self._step_count.steps(self._state, omega, last, frame, bool(self.overlapping))
+        given = omega, self.spectrum.stiffest, last, frame, bool(self.overlapping)
+        n = self._step_count.steps(self._state, *given)
         dt = 1.0 / (self.fps * n)
         damping_stages = stages_for(rate, dt)
         if self.dt is not None and dt != self.dt:

@@ -71,8 +71,7 @@ def test_a_run_beyond_its_time_fails_and_says_how_far_it_came():
 
     motion = ours.run(replace(blocks(), frames=9), DEFAULT, None, 0.0)
     assert motion.reason == "too slow: 2 of 9 frames in 0 s"
-    assert motion.wall > 0.0
-    assert motion.x is None
+    assert motion.wall > 0.0 and motion.x is None
 
 
 def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
@@ -96,8 +95,7 @@ def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
     motions = [motion for *_, motion in runs.runs(blocks(), own, {}, "", 1.0)]
     for s, steps in taken.items():
         assert steps == (None if s.factor == 1 else s.factor * alone[s.method, s.times])
-    failed = [motion.reason for motion in motions if motion.reason]
-    assert failed == ["not finite", "no run with steps x1"]
+    assert [m.reason for m in motions if m.reason] == ["not finite", "no run with steps x1"]
     assert {s.factor for s in taken if s.method == "predicted"} == {1, 2, 4}
 
 
@@ -133,8 +131,7 @@ def test_both_columns_carry_the_same_pressure_where_they_meet(law):
 
     soft = pressure(MEETING[law], SOFT)
     assert soft == pytest.approx(pressure(2.0 - OVERLAP - MEETING[law], STIFF), rel=1e-12)
-    # Linear bars would; at 9 % of strain the laws are off by about as much.
-    assert soft == pytest.approx(SOFT * OVERLAP / 1.1, rel=0.15)
+    assert soft == pytest.approx(SOFT * OVERLAP / 1.1, rel=0.15)  # of linear bars; 9 % of strain
 
 
 def points():
@@ -288,8 +285,7 @@ def test_every_pair_that_presses_is_in_its_scene():
     for name, count in (("squeezed_sphere", 2), ("cubes_on_membrane", 3)):
         labels = {body.label for body in scenes.scene(name, True)[0].scene().bodies}
         pairs = [pair for pair in scenes.PRESSED if labels & {*pair}]
-        assert len(pairs) == count
-        assert {label for pair in pairs for label in pair} == labels
+        assert len(pairs) == count and {label for pair in pairs for label in pair} == labels
 
 
 def test_the_kept_table_is_drawn_without_a_run(tmp_path, monkeypatch):

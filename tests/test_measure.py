@@ -1,7 +1,6 @@
 """tools/measure/: levels and bounds, runs that stop, the table and the files."""
 
 import argparse
-import csv
 import json
 import math
 import sys
@@ -11,7 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
-from measure import report, run
+from measure import machine, report, run
 from measure.figure import Figure, lowest, relative, zero
 
 from warp_contact import SimulationError
@@ -84,14 +83,16 @@ def test_names_that_there_are_not_are_refused():
         run.count("0")
 
 
-def test_files_have_the_figures_and_the_machine(tmp_path):
+def test_a_line_has_four_digits_and_the_target_exact_or_by_its_bounds():
+    line = report.line(relative("case", "force [N]", 1.05, 1.0, LIMITS))
+    assert line.split() == ["case", "force", "[N]", "1.05", "1", "0.05", "good"]
+    line = report.line(Figure("", "time", None, least=0.123456, most=2.0, note="!"))
+    assert line.split() == ["time", ">=", "0.1235", "<=", "2", "missed", "!"]
+
+
+def test_a_file_has_the_figures_and_the_machine(tmp_path):
     figures = [relative("case", "force [N]", 1.05, 1.0, LIMITS), Figure("", "time", None, note="!")]
-    report.write(tmp_path / "out.csv", figures)
-    text = (tmp_path / "out.csv").read_text()
-    force, time = csv.DictReader(text.splitlines()[1:])
-    assert (force["name"], float(force["value"]), force["level"]) == ("force [N]", 1.05, "good")
-    assert (time["value"], time["note"], time["level"]) == ("", "!", "")
     report.write(tmp_path / "out.json", figures)
     found = json.loads((tmp_path / "out.json").read_text())
     assert found["figures"] == {"case.force [N]": 1.05, "time": None}
-    assert found["versions"]["warp-lang"] and found["cpu"] in text
+    assert found["versions"]["warp-lang"] and found["cpu"] in machine.line()

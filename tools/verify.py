@@ -1,6 +1,6 @@
 """Measure the simulator against closed forms and targets, and print one table.
 
-    python tools/verify.py [case ...] [--quick] [--response NAME] [--csv FILE] [--seed N]
+    python tools/verify.py [case ...] [--quick] [--response NAME] [--seed N]
 
 A figure with a closed form is an error against an exact value and reaches a level: good, excellent,
 best; one with a target is ok within it. A case holds what all of its figures hold. The exit status
@@ -9,10 +9,10 @@ is 1 when one is missed. No time is measured.
 
 import sys
 from functools import partial
-from importlib import import_module
+from pkgutil import resolve_name
 
 from measure import machine, report
-from measure.figure import Figures, lowest
+from measure.figure import lowest
 from measure.run import command_line, one_of, run, status
 from verification.setup import RESPONSES, Ask
 
@@ -42,26 +42,17 @@ def main() -> int:
     names = f"of {', '.join(CASES)}; or all"
     parser.add_argument("cases", nargs="*", metavar="case", type=one_of(CASES), help=names)
     parser.add_argument("--quick", action="store_true", help="fewer variants, coarser meshes")
-    parser.add_argument("--response", choices=RESPONSES, default=RESPONSES[0])
-    parser.add_argument("--csv", metavar="FILE", help="write the figures there too")
+    parser.add_argument("--response", choices=RESPONSES, default="default")
     parser.add_argument("--seed", type=int, default=0, help="of the jittered meshes")
     args = parser.parse_args()
-    title = f"response {args.response}, SEED={args.seed}"
-    print(machine.line(), title, "", sep="\n")
+    print(machine.line(), f"response {args.response}, SEED={args.seed}", "", sep="\n")
     print(report.FIGURES.head())
-    chosen = [CASES[name] for name in args.cases or CASES]
     ask = Ask(args.quick, args.response, args.seed)
-    found = run({title: partial(figures, where, ask) for title, where in chosen})
+    chosen = [CASES[name] for name in args.cases or CASES]
+    cases = {title: resolve_name(f"verification.{where}") for title, where in chosen}
+    found = run({title: partial(case, ask) for title, case in cases.items()})
     print("", *(f"{title}: {lowest(kept)}" for title, kept in found.items()), sep="\n")
-    if args.csv:
-        report.write(args.csv, [f for kept in found.values() for f in kept], title=title)
     return status(found)
-
-
-def figures(where: str, ask: Ask) -> Figures:
-    """Those of a case; only the files of cases that are asked for are imported."""
-    file, function = where.split(".")
-    return getattr(import_module(f"verification.{file}"), function)(ask)
 
 
 if __name__ == "__main__":

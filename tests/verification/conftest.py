@@ -24,7 +24,7 @@ def hold():
     def check(figures, level: str, but: dict[str, str] | None = None) -> dict[str, float]:
         found = list(figures)
         print(*found, sep="\n")
-        judged = [f for f in found if f.judged]
+        judged = [f for f in found if f.level]
         assert judged, "nothing was judged"
         missed = []
         for f in judged:

@@ -9,9 +9,8 @@ A figure is judged in one of two ways, or only shown:
 What holds nothing is ``missed``.
 """
 
-import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,47 +19,30 @@ ORDER = OK, BEST, EXCELLENT, GOOD, MISSED  # each is worse than those before it
 LEVELS = GOOD, EXCELLENT, BEST  # of two or three limits
 
 
-@dataclass(frozen=True)
-class Figure:
-    """One figure.
+class Figure(NamedTuple):
+    """One figure."""
 
-    Attributes:
-        case: what was run
-        name: what was measured, with its unit
-        value: as measured, None where nothing could be
-        reference: exact value, or the one to compare with
-        error: what the limits are for
-        limits: largest sizes of the error, from the widest to the strictest
-        least, most: bounds of the value
-        note: what there is to say beyond the number
-    """
-
-    case: str
-    name: str
-    value: float | None
-    reference: float | None = None
-    error: float | None = None
+    case: str  # what was run
+    name: str  # what was measured, with its unit
+    value: float | None  # None where nothing could be measured
+    reference: float | None = None  # exact value, or the one to compare with
+    error: float | None = None  # what the limits are for
     limits: tuple[float, ...] = ()
     least: float | None = None
     most: float | None = None
-    note: str = ""
-
-    @property
-    def judged(self) -> bool:
-        """Whether anything is wanted of it."""
-        return bool(self.limits) or self.least is not None or self.most is not None
+    note: str = ""  # what there is to say beyond the number
 
     @property
     def level(self) -> str:
         """What it reaches, one of ``ORDER``; empty for a figure that is shown only."""
-        if not self.judged:
+        if self.limits:
+            held = sum(self.error is not None and abs(self.error) <= most for most in self.limits)
+            return (MISSED, *(LEVELS if len(self.limits) > 1 else (OK,)))[held]
+        if self.least is None and self.most is None:
             return ""
-        if not self.limits:
-            low = -math.inf if self.least is None else self.least
-            high = math.inf if self.most is None else self.most
-            return OK if self.value is not None and low <= self.value <= high else MISSED
-        held = sum(self.error is not None and abs(self.error) <= most for most in self.limits)
-        return (MISSED, *(LEVELS if len(self.limits) > 1 else (OK,)))[held]
+        value = np.nan if self.value is None else self.value
+        low = self.least is None or value >= self.least
+        return OK if low and (self.most is None or value <= self.most) else MISSED
 
 
 Figures = Iterator[Figure]
@@ -78,7 +60,7 @@ def zero(case: str, name: str, value: float, limits=()) -> Figure:
 
 def lowest(figures: Iterable[Figure]) -> str:
     """What all judged figures hold; empty where none is judged."""
-    return max((f.level for f in figures if f.judged), key=ORDER.index, default="")
+    return max((f.level for f in figures if f.level), key=ORDER.index, default="")
 
 
 def rms(values) -> float:

@@ -3,6 +3,7 @@
 import datetime
 import os
 import platform
+import re
 from importlib.metadata import version
 from pathlib import Path
 
@@ -13,15 +14,16 @@ PACKAGES = "warp_contact", "warp-lang", "numpy"
 
 def about(device: str | None = None) -> dict:
     """Machine, device, versions and date; ``device`` as Warp names it, the default one if None."""
-    used = wp.get_device(device)
-    versions = {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
+    used, info = wp.get_device(device), Path("/proc/cpuinfo")
+    model = re.search(r"model name\s*: (.*)", info.read_text() if info.exists() else "")
+    cpu = model[1] if model else platform.processor() or platform.machine()
     return {
-        "cpu": _cpu(),
+        "cpu": cpu,
         "cores": os.cpu_count(),
         "system": platform.system(),
         "device": used.alias,
-        "device_name": used.name if used.is_cuda else _cpu(),
-        "versions": versions,
+        "device_name": used.name if used.is_cuda else cpu,
+        "versions": {"python": platform.python_version()} | {p: version(p) for p in PACKAGES},
         "date": datetime.date.today().isoformat(),
     }
 
@@ -31,13 +33,3 @@ def line(device: str | None = None) -> str:
     a = about(device)
     versions = ", ".join(f"{name} {number}" for name, number in a["versions"].items())
     return f"{a['date']}, {versions}, {a['device']}: {a['device_name']}, {a['cores']} cores"
-
-
-def _cpu() -> str:
-    try:
-        for text in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if text.startswith("model name"):
-                return text.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()

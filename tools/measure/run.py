@@ -9,25 +9,22 @@ from measure import report
 from measure.figure import MISSED, Figure, Figures, lowest
 from warp_contact import SimulationError
 
-Case = Callable[[], Iterable[Figure]]
 
-
-def run(cases: Mapping[str, Case]) -> dict[str, list[Figure]]:
+def run(cases: Mapping[str, Callable[[], Iterable[Figure]]]) -> dict[str, list[Figure]]:
     """The figures of every case by its name, each printed as it comes.
 
     A case that ends with a ``SimulationError`` keeps the figures that it has and misses.
     """
     found = {}
     for name, case in cases.items():
-        found[name] = kept = []
-        for figure in guarded(name, case):
-            kept.append(figure)
+        found[name] = []
+        for figure in _guarded(name, case):
+            found[name].append(figure)
             print(report.line(figure), flush=True)
     return found
 
 
-def guarded(name: str, case: Case) -> Figures:
-    """The figures of a case, the last of them the error that ended it, if any."""
+def _guarded(name: str, case: Callable) -> Figures:
     try:
         yield from case()
     except SimulationError as error:

@@ -1,5 +1,1 @@
-"""The cases of ``tools/verify.py``: functions that take what is asked and yield figures.
-
-Most have a closed form: a figure is an error against it and reaches one of three levels, whose
-limits stand in the file of the case next to their reason. Others are held to a target.
-"""
+"""The cases of ``tools/verify.py``: functions that take what is asked and yield figures."""

@@ -54,8 +54,7 @@ def run(ask: Ask) -> Figures:
     for cells, ratio, place in product(*(quick if ask.quick else (CELLS, RATIOS)), PLACES):
         found = collide(build(*cells, ratio, place), ask.respond(STIFFNESS))
         worst = np.maximum(worst, list(found.values()))
-        label = f"A6 {cells[0]}:{cells[1]} 1:{ratio:g} {place}"
-        yield from judged(label, found, TURNED)
+        yield from judged(f"A6 {cells[0]}:{cells[1]} 1:{ratio:g} {place}", found, TURNED)
     yield from judged("A6 worst", dict(zip(NAMES, worst, strict=True)), TURNED)
     for way, ratio in product(WAYS, DENSITIES):
         yield from hit(ask, (3, 5) if ask.quick else (5, 9), way, ratio)
@@ -64,7 +63,7 @@ def run(ask: Ask) -> Figures:
 def hit(ask: Ask, cells: tuple[int, int], way: str, ratio: float) -> Figures:
     """Thrown blocks."""
     found = collide(thrown(cells, way, ratio), ask.respond(STIFFNESS), STEPS)
-    yield from judged(f"A6 {way} {cells[0]}:{cells[1]} density 1:{ratio:g}", found, MOMENTUM)
+    return judged(f"A6 {way} {cells[0]}:{cells[1]} density 1:{ratio:g}", found, MOMENTUM)
 
 
 def judged(label: str, found: dict[str, float], angular: tuple) -> Figures:
@@ -80,20 +79,16 @@ def collide(scene: wc.Scene, response=None, steps: int = 0) -> dict[str, float]:
     """Run until the blocks are apart again, ``steps`` at least; the worst of each figure."""
     sim = wc.Simulation(scene, response, fps=FPS)
     edge = float(sim.model.body_edge.numpy().min())
-    p, l, p_scale, l_scale = motion(sim)
+    p, l, *scales = motion(sim)
     start, worst, done, hit = sim.measure().energy, np.zeros(len(NAMES)), 0, False
     while done < steps or sim.time < DURATION:
         sim.step_frame()
         done += sim.substeps
-        measured, now = sim.measure(), motion(sim)
+        measured, (p_now, l_now, *_) = sim.measure(), motion(sim)
         hit = hit or measured.n_contacts > 0
-        figures = (
-            np.linalg.norm(now[0] - p) / p_scale,
-            np.linalg.norm(now[1] - l) / l_scale,
-            measured.energy / start,
-            100.0 * measured.overlap / edge,
-        )
-        worst = np.maximum(worst, figures)
+        changes = np.linalg.norm([p_now - p, l_now - l], axis=1) / scales
+        energy, overlap = measured.energy / start, 100.0 * measured.overlap / edge
+        worst = np.maximum(worst, [*changes, energy, overlap])
     if not hit:
         worst[:] = np.nan  # no figure of a collision
     return dict(zip(NAMES, worst.tolist(), strict=True))
@@ -114,14 +109,11 @@ def build(
 ) -> wc.Scene:
     """Blocks of a and b cells along an edge, the second ``ratio`` times as stiff."""
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=friction)
-    q, straight = quaternion(angles), ALIGNED.q
-    turn = q if "turned" in place else straight
-    other = q if "tilted" in place else turn
+    turn = quaternion(angles) if "turned" in place else ALIGNED.q
+    other = quaternion(angles) if "tilted" in place else turn
     whole, upper = rotation_matrix(turn), wc.box(EDGE, b)
     low = (upper.vertices @ rotation_matrix(other).T @ whole)[:, 2].min()
-    away = np.array([0.0, 0.0, 0.5 * EDGE + GAP - low])
-    if "shifted" in place:
-        away += shift
+    away = np.array([0.0, 0.0, 0.5 * EDGE + GAP - low]) + (shift if "shifted" in place else 0.0)
     v = whole @ [0.0, 0.0, 0.5 * SPEED]
     soft, stiff = (wc.NeoHookean(k * YOUNG, POISSON, DENSITY) for k in (1.0, ratio))
     scene.add_body(wc.box(EDGE, a), soft, -0.5 * whole @ away, turn, v)
@@ -131,16 +123,15 @@ def build(
 
 def thrown(cells: tuple[int, int], way: str, ratio: float) -> wc.Scene:
     """Two blocks that meet along z, the second ``ratio`` times as dense."""
-    head_on, spinning = way == "head-on", way == "spinning"
-    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0 if head_on else FRICTION)
+    aside, spinning = float(way != "head-on"), way == "spinning"
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=FRICTION * aside)
     # A spinning block is free of the other one at any angle.
     away = (0.5 * EDGE + GAP) * (np.sqrt(2.0) if spinning else 1.0)
-    aside = 0.0 if head_on else 0.5 * SLIDE
-    shift = np.zeros(3) if head_on else 0.5 * SHIFT
     for k, sign in enumerate((-1.0, 1.0)):
         mesh = wc.box(EDGE, cells[k])
         spin = sign * SPIN * spinning * np.array([0.6, 0.0, 0.8])
-        v = np.cross(spin, mesh.vertices) - sign * np.array([aside, 0.0, 0.5 * SPEED])
+        v = np.cross(spin, mesh.vertices) - sign * 0.5 * np.array([SLIDE * aside, 0.0, SPEED])
         material = wc.NeoHookean(YOUNG, POISSON, DENSITY * ratio**k)
-        scene.add_body(mesh, material, sign * (shift + [0.0, 0.0, away]), velocity=v)
+        place = sign * (0.5 * SHIFT * aside + [0.0, 0.0, away])
+        scene.add_body(mesh, material, place, velocity=v)
     return scene

@@ -8,8 +8,8 @@ corotated column is then exactly linear in its axial stretch, P = E (F - R) with
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from verification.setup import ALIGNED, Ask, Pose, block, forces, gradients, on_
 from warp_contact.scene.scene import Body
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """E [Pa], length [m], density [kg/m^3], cells, section [m], mesh with its seed, damping [s]."""
 
     young: float
@@ -43,20 +42,15 @@ class Column:
         return 0.5 * np.pi * self.wave_speed / self.length
 
 
-@dataclass(frozen=True)
-class Pile:
-    """Columns from below, from the height ``base`` [m], with a gap [m] or overlap (below 0).
-
-    The foot of the first is held, and the top of the last where the pile is clamped; gravity
-    [m/s^2] acts along -z.
-    """
+class Pile(NamedTuple):
+    """Columns from below; the foot of the first is held."""
 
     columns: Sequence[Column]
-    gap: float
-    base: float = 0.0
-    clamped: bool = False
+    gap: float  # between them [m], below 0 an overlap
+    base: float = 0.0  # height of the foot [m]
+    clamped: bool = False  # the top of the last is held too
     pose: Pose = ALIGNED
-    gravity: float = 0.0
+    gravity: float = 0.0  # along -z [m/s^2]
     friction: float = 0.0
 
     def build(self, law=wc.Corotated) -> wc.Scene:
@@ -76,7 +70,8 @@ class Pile:
     def simulate(self, ask: Ask, load: float | None = None) -> wc.Simulation:
         """A simulation in frames of about one step; a penalty has 100 E A / L in all.
 
-        It starts at rest under a pressure ``load`` [Pa] on top, or in the rest shapes.
+        It starts at rest under the weights and a pressure ``load`` [Pa] on top, neighbours touching
+        or with a gap above zero; or in the rest shapes.
         """
         first, height = self.columns[0], sum(c.length for c in self.columns)
         contacts = sum((c.cells[0] + 1) * (c.cells[1] + 1) for c in self.columns[:2])
@@ -90,10 +85,7 @@ class Pile:
         return sim
 
     def static(self, scene: wc.Scene, load: float = 0.0) -> list[np.ndarray]:
-        """Positions [m] of each body under the weights and a pressure ``load`` [Pa] on top.
-
-        Neighbours touch, or keep a gap above zero.
-        """
+        """Positions [m] of each body under the weights and a pressure ``load`` [Pa] on top."""
         above = load + self.gravity * sum(c.density * c.length for c in self.columns)
         foot, positions = self.base, []
         for body, c in zip(scene.bodies, self.columns, strict=True):
@@ -126,7 +118,6 @@ def stress(body: Body, x: np.ndarray) -> np.ndarray:
     return body.material.youngs_modulus * (f - u @ vt)
 
 
-def between(sim: wc.Simulation) -> np.ndarray:
+def between(sim: wc.Simulation) -> list[float]:
     """Forces [N] between neighbours, from below."""
-    labels = [body.label for body in sim.scene.bodies]
-    return forces(sim, *pairwise(labels))
+    return forces(sim, *pairwise(body.label for body in sim.scene.bodies))

@@ -33,18 +33,16 @@ def run(ask: Ask) -> Figures:
         yield decay(f"energy {name} damping ratio {ratio:g}", MATERIALS[name], ratio)
 
 
-def build(material) -> wc.Scene:
-    """A bar along x, held at its lower end."""
-    scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
-    mesh = wc.box(SIZE, CELLS)
-    scene.add_body(mesh, material, fixed=on_face(mesh, 0, -1))
-    return scene
-
-
 def decay(case: str, material, ratio: float) -> Figure:
-    """Release the bar in its first mode and fit the envelope."""
-    omega, mode = first_mode(wc.Simulation(build(material(0.0))))
-    sim = wc.Simulation(build(material(2.0 * ratio / omega)), fps=FRAMES * omega / (2.0 * np.pi))
+    """Release a bar along x, held at its lower end, in its first mode and fit the envelope."""
+
+    def start(damping: float, fps: float) -> wc.Simulation:
+        scene, mesh = wc.Scene(gravity=(0.0, 0.0, 0.0)), wc.box(SIZE, CELLS)
+        scene.add_body(mesh, material(damping), fixed=on_face(mesh, 0, -1))
+        return wc.Simulation(scene, fps=fps)
+
+    omega, mode = first_mode(start(0.0, 60.0))
+    sim = start(2.0 * ratio / omega, FRAMES * omega / (2.0 * np.pi))
     rest = sim.positions().astype(float)
     sim.state.x.assign((rest + AMPLITUDE * mode).astype(np.float32))
     weight = masses(sim)[:, None] * mode

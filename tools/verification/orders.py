@@ -51,30 +51,36 @@ def run(ask: Ask) -> Figures:
     yield from shape(ask, 0.5 if ask.quick else 1.0)
 
 
-def order(label: str, name: str, sizes, errors, target: tuple[float, tuple]) -> Figure:
-    """Slope of log error over log size by least squares; none unless the errors fall throughout."""
+def order(label: str, name: str, counts, errors, target: tuple[float, tuple]) -> Figure:
+    """Slope of log error over log 1 / count by least squares; none unless all errors fall."""
     errors = np.abs(np.asarray(errors, dtype=float))
-    slope = float(np.polyfit(np.log(sizes), np.log(np.maximum(errors, 1e-300)), 1)[0])
-    falling = bool((np.diff(errors) < 0.0).all()) and len(errors) > 1
+    sizes = np.log(1.0 / np.array(counts))
+    slope = float(np.polyfit(sizes, np.log(np.maximum(errors, 1e-300)), 1)[0])
     ideal, limits = target
-    missing = max(ideal - slope, 0.0) if falling else float("inf")
+    missing = max(ideal - slope, 0.0) if (np.diff(errors) < 0.0).all() else float("inf")
     return Figure(label, name, slope, ideal, missing, limits)
+
+
+def listed(counts) -> str:
+    """Numbers in a label."""
+    return ", ".join(map(str, counts))
 
 
 def impact(ask: Ask, counts) -> Figures:
     """Restitution and energy of a bar on a wall; the step follows the elements."""
     found = [bars.record(bars.IMPACTS["on a wall"], ask, n) for n in counts]
-    label = f"A8 bar on a wall, N = {', '.join(map(str, counts))}"
-    sizes = 1.0 / np.array(counts)
-    yield order(label, "order of 1 - e", sizes, [1.0 - h.e for h in found], IMPACT)
-    lost = [1.0 - h.energy[-1] for h in found]
-    yield order(label, "order of the energy lost", sizes, lost, IMPACT)
+    _, energy, _, _, e = zip(*found, strict=True)
+    label = f"A8 bar on a wall, N = {listed(counts)}"
+    yield order(label, "order of 1 - e", counts, 1.0 - np.array(e), IMPACT)
+    lost = [1.0 - left[-1] for left in energy]
+    yield order(label, "order of the energy lost", counts, lost, IMPACT)
 
 
-def in_steps(label: str, name: str, start: tuple, x: np.ndarray, seconds: float, of) -> Figure:
-    """Order of what ``of(sim)`` [m] is after some time, from differences of successive steps.
+def in_steps(what: tuple[str, str], of, start: tuple, x: np.ndarray, seconds: float) -> Figure:
+    """Order of ``of(sim)`` [m] after some time, from differences of successive steps.
 
-    ``start`` is a scene, a response and the frames per second, ``x`` the positions [m].
+    ``what`` are the words for body and ``of``, ``start`` is a scene, a response and the frames per
+    second, ``x`` the positions [m].
     """
     found = []
     for n in SUBSTEPS:
@@ -83,20 +89,17 @@ def in_steps(label: str, name: str, start: tuple, x: np.ndarray, seconds: float,
         watch(sim, seconds)
         found.append(of(sim).astype(float))
     errors = [np.linalg.norm(b - a) for a, b in pairwise(found)]
-    label = f"{label}, {', '.join(map(str, SUBSTEPS))} steps a frame"
-    return order(label, name, 1.0 / np.array(SUBSTEPS[:-1]), errors, SMOOTH)
+    label, name = f"A8 {what[0]}, {listed(SUBSTEPS)} steps a frame", f"order of the {what[1]} in dt"
+    return order(label, name, SUBSTEPS[:-1], errors, SMOOTH)
 
 
 def sliding(ask: Ask) -> Figures:
     """Place of a block on a slope, in motion from the start: letting go is not smooth."""
     scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
-    x = friction.begin(ask, scene).positions()
     start = scene, ask.respond(*friction.PENALTY), FPS
-
-    def place(sim: wc.Simulation) -> np.ndarray:
-        return friction.centre(sim)[0, :1]
-
-    yield in_steps("A8 sliding block", "order of the place in dt", start, x, SLIDES, place)
+    x = friction.begin(ask, friction.SLOPE, MU).positions()
+    what = "sliding block", "place"
+    yield in_steps(what, lambda sim: friction.centre(sim)[0, :1], start, x, SLIDES)
 
 
 def resting(ask: Ask) -> Figures:
@@ -104,40 +107,32 @@ def resting(ask: Ask) -> Figures:
 
     It starts at rest with a part of its weight; velocities count by length over wave speed.
     """
-    fps = step_rate(LENGTH / LAYERS, WAVE)
-    at_rest = wc.Simulation(standing(DIP), ask.respond(ON_PLANE), fps)
-    omega = 0.5 * np.pi * WAVE / LENGTH
-    for _ in relax(at_rest, omega, round(14.0 / omega * fps)):
-        pass
-    rate = 10.0 * WAVE / LENGTH
-    start = standing(1.0), ask.respond(ON_PLANE), rate
-    x = at_rest.positions()
+
+    def standing(part: float, fps: float) -> tuple:
+        scene = wc.Scene(gravity=(0.0, 0.0, -part * G), friction=0.0)
+        scene.add_plane((0.0, 0.0, 1.0))
+        mesh = wc.box((LENGTH / LAYERS, LENGTH / LAYERS, LENGTH), (1, 1, LAYERS))
+        scene.add_body(mesh, wc.Corotated(YOUNG, 0.0, DENSITY), (0, 0, 0.5 * LENGTH))
+        return scene, ask.respond(ON_PLANE), fps
 
     def state(sim: wc.Simulation) -> np.ndarray:
         return np.append(sim.positions(), sim.velocities() * LENGTH / WAVE)
 
-    yield in_steps("A8 resting bar", "order of the state in dt", start, x, WAIT / rate, state)
-
-
-def standing(part: float) -> wc.Scene:
-    """The bar on a plane under a part of gravity."""
-    scene = wc.Scene(gravity=(0.0, 0.0, -part * G), friction=0.0)
-    scene.add_plane((0.0, 0.0, 1.0), 0.0)
-    width = LENGTH / LAYERS
-    mesh = wc.box((width, width, LENGTH), (1, 1, LAYERS))
-    scene.add_body(mesh, wc.Corotated(YOUNG, 0.0, DENSITY), (0, 0, 0.5 * LENGTH))
-    return scene
+    at_rest = wc.Simulation(*standing(DIP, step_rate(LENGTH / LAYERS, WAVE)))
+    omega, rate = 0.5 * np.pi * WAVE / LENGTH, 10.0 * WAVE / LENGTH
+    for _ in relax(at_rest, omega, round(14.0 / omega * at_rest.fps)):
+        pass
+    what, x = ("resting bar", "state"), at_rest.positions()
+    yield in_steps(what, state, standing(1.0, rate), x, WAIT / rate)
 
 
 def pressure(ask: Ask, counts) -> Figures:
     """L2 error of the pressure below a sphere and a cylinder."""
     for body, case in (("sphere", hertz.on_plane), ("cylinder", hertz.line_on_plane)):
-        errors = []
-        for n in counts:
-            found = case(ask, n, ALIGNED)
-            errors.append(next((f.value for f in found if f.name == hertz.OVERALL), np.nan))
-        label = f"A8 {body} on plane, N = {', '.join(map(str, counts))}"
-        yield order(label, "order of the pressure, L2", 1.0 / np.array(counts), errors, PRESSURE)
+        found = (case(ask, n, ALIGNED) for n in counts)
+        errors = [next(f.value for f in figures if f.name == hertz.OVERALL) for figures in found]
+        label = f"A8 {body} on plane, N = {listed(counts)}"
+        yield order(label, "order of the pressure, L2", counts, errors, PRESSURE)
 
 
 def shape(ask: Ask, across: float) -> Figures:
@@ -154,5 +149,5 @@ def shape(ask: Ask, across: float) -> Figures:
         at = np.linalg.norm(first[:, None] - start, axis=2).argmin(axis=1)
         found.append((sim.positions().astype(float) - start)[at])
     errors = [np.sqrt(weight @ ((v - u) ** 2).sum(axis=1)) for u, v in pairwise(found)]
-    label = f"A8 sphere on plane, {', '.join(map(str, RINGS))} rings"
-    yield order(label, "order of the displacement, L2", 1.0 / np.array(RINGS[:-1]), errors, SHAPE)
+    label = f"A8 sphere on plane, {listed(RINGS)} rings"
+    yield order(label, "order of the displacement, L2", RINGS[:-1], errors, SHAPE)

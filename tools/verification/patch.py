@@ -9,7 +9,6 @@ and Papadopoulos 1991). They start in the exact solution and are given the time 
 import numpy as np
 from measure.figure import Figures, relative, rms, zero
 
-import warp_contact as wc
 from verification.columns import Column, Pile, between
 from verification.relax import rest
 from verification.setup import ALIGNED, Ask, Pose
@@ -52,29 +51,20 @@ def pair(cells: tuple[int, int], slab: bool, pose: Pose, mesh="structured", seed
 
 def press(ask: Ask, cells: tuple, slab: bool, pose: Pose, mesh="structured") -> Figures:
     """Stresses of all tets and the force between the blocks."""
-    label = f"A2 {'slab' if slab else 'solid'} {cells[0]}:{cells[1]} {mesh} {pose}"
+    label = f"A2 {'slab' if slab else 'solid'} {cells[0]}:{cells[1]} {mesh} {pose.name}"
     pile = pair(cells, slab, pose, mesh, ask.seed)
     sim = pile.simulate(ask, EXACT)
-    bodies = sim.scene.bodies
-
-    def look() -> np.ndarray:
-        return np.append(pile.pressures(sim, *bodies), between(sim))
-
-    *stress, force = rest(sim, pile.columns[0].slowest, SETTLE, look).mean(axis=0)
-    error = np.abs(np.array(stress) / EXACT - 1.0)
-    force /= THICK if slab else 1.0
-    yield relative(label, "contact force / section [Pa]", force, EXACT, FORCE)
+    bodies, slowest = sim.scene.bodies, pile.columns[0].slowest
+    found = rest(sim, slowest, SETTLE, lambda: [*pile.pressures(sim, *bodies), *between(sim)])
+    *stress, force = found.mean(axis=0)
+    error, section = np.abs(np.array(stress) / EXACT - 1.0), THICK if slab else 1.0
+    yield relative(label, "contact force / section [Pa]", force / section, EXACT, FORCE)
     yield zero(label, "stress of the tets, rms error", rms(error), RMS)
     yield zero(label, "stress of the tets, largest error", error.max(), MAX)
-    inner = np.concatenate([away_from_rim(body.mesh) for body in bodies])
+    # Tets without a vertex on a side; the long sides of a slab count as inside.
+    corners = np.abs(np.concatenate([b.mesh.vertices[b.mesh.tets][:, :, :2] for b in bodies]))
+    on_side = (corners > 0.999 * np.array([0.5, 0.5 * section])).any(axis=1)
+    inner = ~(on_side[:, 0] | (on_side[:, 1] & (not slab)))
     if inner.any():
         yield zero(label, "the same away from the rims of the faces", error[inner].max())
     yield zero(label, "deepest overlap [of the push]", sim.measure().overlap / PUSH)
-
-
-def away_from_rim(mesh: wc.TetMesh) -> np.ndarray:
-    """Mask of the tets without a vertex on a side; the long sides of a slab count as inside."""
-    x = np.abs(mesh.vertices[mesh.tets][:, :, :2])
-    half = np.abs(mesh.vertices[:, :2]).max(axis=0)
-    on_side = (x > 0.999 * half).any(axis=1)
-    return ~(on_side[:, 0] | (on_side[:, 1] & (half[1] > THICK)))

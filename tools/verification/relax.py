@@ -44,23 +44,19 @@ def relax(sim: wc.Simulation, omega: float, frames: int) -> Iterator[int]:
     factor = float(np.exp(-2.0 * ZETA * omega / sim.fps))
     for frame in sim.frames(frames):
         yield frame
-        calm(sim, factor)
+        ahead = 0.5 * acceleration(sim) / (sim.fps * max(sim.substeps, 1))
+        v = sim.velocities()
+        mobile = sim.model.inv_mass.numpy()[:, None] > 0.0
+        sim.state.v.assign(np.where(mobile, factor * (v + ahead) - ahead, v).astype(np.float32))
 
 
-def calm(sim: wc.Simulation, factor: float) -> None:
-    """Multiply the velocities of mobile vertices, taken at the time of the positions."""
+def acceleration(sim: wc.Simulation) -> np.ndarray:
+    """By elasticity and gravity [m/s^2], none where contact balances them; shape (n_vert, 3)."""
     model = sim.model
-    f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3, device=sim.device)
-    ones = wp.full(model.n_tet, 1, dtype=int, device=sim.device)
-    with wp.ScopedDevice(sim.device):
-        forces.internal_forces(model, sim.state.x, ones, f_tet)
+    f_tet, on = wp.zeros(4 * model.n_tet, dtype=wp.vec3), wp.full(model.n_tet, 1, dtype=int)
+    forces.internal_forces(model, sim.state.x, on, f_tet)
     a = np.zeros((model.n_vert, 3))
     np.add.at(a, model.tets.numpy().ravel(), f_tet.numpy().reshape(-1, 3).astype(float))
-    inv_mass = model.inv_mass.numpy()[:, None]
-    a = inv_mass * a + np.array(model.gravity)
-    held = sim.contact_fields()["pressure"] > 0.0  # contact balances the other forces there
-    a[held] = 0.0
-    ahead = 0.5 * a / (sim.fps * max(sim.substeps, 1))
-    v = sim.velocities()
-    calmed = factor * (v + ahead) - ahead
-    sim.state.v.assign(np.where(inv_mass > 0.0, calmed, v).astype(np.float32))
+    a = model.inv_mass.numpy()[:, None] * a + np.array(model.gravity)
+    a[sim.contact_fields()["pressure"] > 0.0] = 0.0
+    return a

@@ -16,66 +16,62 @@ TINY = 1e-6  # a volume ratio above which a tet is not inverted
 CLEAR = 1e-3  # of an edge: an overlap that counts as resolved
 DEEPEST = 1.0  # overlap that a contact surface may leave [% of an edge]
 UPWARD = 0.2  # of the z of a normal of length 1: the inside of a bowl, but not its rim
+CARRIED = {  # who carries whom, by their order in the scene; elsewhere the first carries all others
+    "two_bodies": ((0, 1), (2, 3)),
+    "sampling": ((0, 1), (2, 3)),
+    "squeezed_sphere": ((0, 1), (1, 2)),
+    "membrane_stack": tuple(pairwise(range(membrane_stack.COUNT))),
+}
 TIMES = 0.0, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0  # of the energies that are shown [s]
 
 
 def run(ask: Ask) -> Figures:
     """Every scene but the bowl."""
-    frames = round((QUICK if ask.quick else DURATION) * FPS)
     for name in sorted(set(scenes.names()) - {"bowl"}):
         module = scenes.load(name)
         for response in (wc.ContactSurface(), wc.Penalty(**module.PENALTY)):
-            yield from play(name, module.build(), response, frames)
+            yield from play(name, module.build(), response, QUICK if ask.quick else DURATION)
 
 
 def bowl(ask: Ask) -> Figures:
     """The bowl of fruit in 64 steps a frame: long on a CPU."""
-    settings, duration = ({"fraction": 0.2}, 0.25) if ask.quick else ({}, DURATION)
-    scene = scenes.load("bowl").build(**settings)
-    return play("bowl", scene, wc.ContactSurface(), round(duration * FPS), 64)
+    settings, seconds = ({"fraction": 0.2}, 0.25) if ask.quick else ({}, DURATION)
+    return play("bowl", scenes.load("bowl").build(**settings), wc.ContactSurface(), seconds, 64)
 
 
-def play(name: str, scene: wc.Scene, response, frames: int, substeps=None) -> Figures:
+def play(name: str, scene: wc.Scene, response, seconds: float, substeps=None) -> Figures:
     """Run a scene: what counts for every one, then what its picture shows."""
     sim = wc.Simulation(scene, response, fps=FPS, substeps=substeps)
-    measured = [sim.measure()]
-    error = ""
+    measured, error = [sim.measure()], ""
     try:
-        measured += (sim.measure() for _ in sim.frames(frames))
+        measured += (sim.measure() for _ in sim.frames(round(seconds * FPS)))
     except SimulationError as stop:
         error = str(stop)
     strict = isinstance(response, wc.ContactSurface)
-    case = f"scenes {name} {'contact surface' if strict else 'penalty'}"
+    case, end = f"scenes {name} {'contact surface' if strict else 'penalty'}", f"{sim.time:.2f} s"
     yield Figure(case, "stopped by an error", float(bool(error)), most=0.0, note=error)
-    ratios, end = [m.volume_ratio for m in measured], f"{sim.time:.2f} s"
-    least = TINY if strict else None
+    ratios, least = [m.volume_ratio for m in measured], TINY if strict else None
     yield Figure(case, f"smallest volume ratio at {end}", ratios[-1], least=least)
     yield Figure(case, "smallest volume ratio ever", min(ratios))
-    lost = fallen(name, sim)
-    most = 0.0 if strict else None
+    lost, most = fallen(name, sim), 0.0 if strict else None
     yield Figure(case, "bodies fallen through", len(lost), most=most, note=", ".join(lost))
-    yield from overlaps(case, sim, measured, strict)
-    yield Figure(case, "kinetic energy, largest [J]", max(m.kinetic for m in measured))
-    yield Figure(case, f"kinetic energy at {end} [J]", measured[-1].kinetic)
-    for figure, value in SHOWN.get(name, lambda *_: {})(sim, measured).items():
-        yield Figure(case, figure, value)
-
-
-def overlaps(case: str, sim: wc.Simulation, measured: list, strict: bool) -> Figures:
-    """When an overlap at the start is resolved; the deepest one from then on, and the last."""
     overlap = [in_edges(sim, m) for m in measured]
     clear = next((k for k, depth in enumerate(overlap) if depth <= CLEAR), None)
-    if clear != 0:
+    if clear != 0:  # an overlap at the start
         first = float("nan") if clear is None else clear
         most = sim.frame if strict else None
         yield Figure(case, "first frame without overlap", first, most=most)
     since = min(sim.frame, 1) if clear is None else clear
     frame = since + int(np.argmax(overlap[since:]))
-    pair = " in ".join(measured[frame].overlap_pair or ())
-    most, note = DEEPEST if strict else None, f"in frame {frame}: {pair}" if pair else ""
-    name = "deepest overlap [% of an edge]"
-    yield Figure(case, name, 100.0 * overlap[frame], most=most, note=note)
-    yield Figure(case, f"overlap at {sim.time:.2f} s [% of an edge]", 100.0 * overlap[-1])
+    pair, most = measured[frame].overlap_pair, DEEPEST if strict else None
+    note = f"in frame {frame}: {' in '.join(pair)}" if pair else ""
+    deepest = 100.0 * overlap[frame]
+    yield Figure(case, "deepest overlap [% of an edge]", deepest, most=most, note=note)
+    yield Figure(case, f"overlap at {end} [% of an edge]", 100.0 * overlap[-1])
+    yield Figure(case, "kinetic energy, largest [J]", max(m.kinetic for m in measured))
+    yield Figure(case, f"kinetic energy at {end} [J]", measured[-1].kinetic)
+    for figure, value in SHOWN.get(name, lambda *_: {})(sim, measured).items():
+        yield Figure(case, figure, value)
 
 
 def in_edges(sim: wc.Simulation, measured: wc.Measure) -> float:
@@ -85,19 +81,11 @@ def in_edges(sim: wc.Simulation, measured: wc.Measure) -> float:
     return measured.overlap / min((edge[label] for label in pair if label in edge), default=1.0)
 
 
-CARRIED = {  # who carries whom, by their order in the scene; elsewhere the first carries all others
-    "two_bodies": ((0, 1), (2, 3)),
-    "sampling": ((0, 1), (2, 3)),
-    "squeezed_sphere": ((0, 1), (1, 2)),
-    "membrane_stack": tuple(pairwise(range(membrane_stack.COUNT))),
-}
-
-
 def fallen(name: str, sim: wc.Simulation) -> list[str]:
     """The bodies whose centre is below a floor, or below the surface that carries them."""
     bodies = sim.scene.bodies
-    floors = [(n, h) for n, h in sim.scene.planes if n[2] > 0.5]
     at = [sim.positions(body).mean(axis=0) for body in bodies]
+    floors = [(n, h) for n, h in sim.scene.planes if n[2] > 0.5]
     lost = {k for k, x in enumerate(at) if any(x @ n < h for n, h in floors)}
     for k, upper in CARRIED.get(name) or ((0, k) for k in range(1, len(bodies))):
         top = facing(bodies[k].x, bodies[k].mesh.surface, 1.0, UPWARD)
@@ -106,18 +94,13 @@ def fallen(name: str, sim: wc.Simulation) -> list[str]:
     return [bodies[k].label for k in sorted(lost)]
 
 
-# What the paper's pictures show.
-
-
 def sink_depths(sim: wc.Simulation, measured: list[wc.Measure]) -> dict[str, float]:
     """How far the bottoms of the cubes are below the membrane."""
     sheet, *cubes = sim.scene.bodies
-    top = facing(sheet.x, sheet.mesh.surface, 1.0)
-    x = sim.positions(sheet)
-    figures = {}
+    top, figures = facing(sheet.x, sheet.mesh.surface, 1.0), {}
     for cube in cubes:
         foot = sim.positions(cube)[np.unique(facing(cube.x, cube.mesh.surface, -1.0))]
-        sink = 1e3 * (height(foot, x, top) - foot[:, 2])
+        sink = 1e3 * (height(foot, sim.positions(sheet), top) - foot[:, 2])
         figures[f"sink depth of {cube.label}, largest [mm]"] = float(np.nanmax(sink))
         figures[f"sink depth of {cube.label}, mean [mm]"] = float(np.nanmean(sink))
     return figures
@@ -136,4 +119,4 @@ def stack_figures(sim: wc.Simulation, measured: list[wc.Measure]) -> dict[str, f
     return figures
 
 
-SHOWN = {"cubes_on_membrane": sink_depths, "membrane_stack": stack_figures}
+SHOWN = {"cubes_on_membrane": sink_depths, "membrane_stack": stack_figures}  # by the pictures

@@ -5,7 +5,7 @@ that are structured, mirrored and jittered, and along the axes and turned.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,45 +16,41 @@ G = 9.81  # [m/s^2]
 MESHES = "structured", "mirrored", "jittered"
 JITTER = 0.15  # of a cell: largest shift of a vertex; no tet comes near to inverting
 ANGLES = 17.0, 31.0, 53.0  # of what is turned, about x, then y, then z [degrees]
-RESPONSES = "default", "literal", "penalty", "predicted"
+RESPONSES = {  # by the constants of a penalty of the case [N/m], [N s/m]
+    "default": lambda *penalty: wc.ContactSurface(),
+    "literal": lambda *penalty: wc.ContactSurface("literal"),
+    "penalty": wc.Penalty,
+    "predicted": lambda *penalty: wc.PredictedForce(),
+}
 
 
-@dataclass(frozen=True)
-class Ask:
-    """What is asked of a case: fewer variants, one of ``RESPONSES``, a seed of jittered meshes."""
+class Ask(NamedTuple):
+    """What is asked of a case."""
 
-    quick: bool = True
-    response: str = "default"
-    seed: int = 0
+    quick: bool = True  # fewer variants
+    response: str = "default"  # one of ``RESPONSES``
+    seed: int = 0  # of jittered meshes
 
     def respond(self, stiffness: float, damping: float = 0.0):
         """The response; a penalty takes the constants of the case [N/m], [N s/m]."""
-        if self.response == "penalty":
-            return wc.Penalty(stiffness, damping)
-        if self.response == "predicted":
-            return wc.PredictedForce()
-        return wc.ContactSurface("literal" if self.response == "literal" else "balanced")
+        return RESPONSES[self.response](stiffness, damping)
 
 
 class Pose:
-    """A rotation of a whole setting: local coordinates to those of the scene and back."""
+    """A rotation of a whole setting: local vectors, shape (..., 3), to the scene and back."""
 
     def __init__(self, turned: bool = False):
         """Along the axes, or turned about all three."""
-        self.turned = turned
+        self.name = "turned" if turned else "aligned"
         self.q = quaternion(ANGLES if turned else (0.0, 0.0, 0.0))
         self._r = rotation_matrix(self.q)
 
-    def __str__(self):
-        """Its name in the table."""
-        return "turned" if self.turned else "aligned"
-
     def out(self, local) -> np.ndarray:
-        """Local vectors, shape (..., 3), in the scene."""
+        """Local vectors in the scene."""
         return np.asarray(local, dtype=float) @ self._r.T
 
     def back(self, world) -> np.ndarray:
-        """Vectors of the scene, shape (..., 3), in local coordinates."""
+        """Vectors of the scene in local coordinates."""
         return np.asarray(world, dtype=float) @ self._r
 
 
@@ -104,25 +100,16 @@ def watch(sim: wc.Simulation, seconds: float, of: Callable = lambda: None) -> np
     return np.array([of() for _ in sim.frames(round(seconds * sim.fps))])
 
 
-def forces(sim: wc.Simulation, *pairs: tuple[str, str]) -> np.ndarray:
-    """Contact forces [N] between pairs of labels, shape (pairs,)."""
+def forces(sim: wc.Simulation, *pairs: tuple[str, str]) -> list[float]:
+    """Contact forces [N] between pairs of labels."""
     found = sim.measure().forces
-    return np.array([found.get(pair, 0.0) for pair in pairs])
+    return [found.get(pair, 0.0) for pair in pairs]
 
 
 def masses(sim: wc.Simulation, body: int | None = None) -> np.ndarray:
     """Of the vertices of one body or of all [kg], in double precision."""
-    ends = sim.model.body_vert.numpy()
-    part = slice(None) if body is None else slice(*ends[body : body + 2])
-    return sim.model.mass.numpy()[part].astype(float)
-
-
-def vertex_areas(sim: wc.Simulation) -> np.ndarray:
-    """A third of the surface around each vertex [m^2], shape (n_vert,)."""
-    tris, x = sim.model.tris.numpy(), sim.positions().astype(float)
-    a, b, c = np.moveaxis(x[tris], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(tris.ravel(), np.repeat(area, 3), minlength=len(x))
+    mass = sim.model.mass.numpy().astype(float)
+    return mass if body is None else mass[sim.model.vert_body.numpy() == body]
 
 
 def facing(x: np.ndarray, tris: np.ndarray, up: float, least: float = 0.9) -> np.ndarray:

@@ -15,7 +15,8 @@ from measure.figure import Figure, Figures, relative, zero
 import warp_contact as wc
 from verification.columns import Column, Pile, between
 from verification.relax import rest
-from verification.setup import Ask, G, forces, masses, vertex_areas, watch
+from verification.setup import Ask, G, forces, masses, watch
+from warp_contact.measure.contact_fields import vertex_area
 
 EDGE = 0.1  # of a block [m]
 YOUNG, POISSON, DENSITY, DAMPING = 5e4, 0.3, 1000.0, 2e-3  # [Pa], [-], [kg/m^3], [s]
@@ -24,14 +25,15 @@ GAP = 0.005  # stacked blocks fall by this [m]
 SETTLE, SAMPLE = 2.0, 0.5  # [s]
 STACK_SAMPLE = 1.0  # [s]
 FPS = 60
-TURN = (0.0, 0.0, np.sin(np.radians(10.0)), np.cos(np.radians(10.0)))  # 20 degrees about z
+STRAIGHT = 0.0, 0.0, 0.0, 1.0
+TURN = 0.0, 0.0, np.sin(np.radians(10.0)), np.cos(np.radians(10.0))  # 20 degrees about z
 STACKS = {  # case: (cells of the lower block, of the upper, ratio of stiffness, rotation)
-    "on a plane": (3, None, 1.0, None),
-    "on a block 3:4": (3, 4, 1.0, None),
-    "on a block 4:3": (4, 3, 1.0, None),
+    "on a plane": (3, None, 1.0, STRAIGHT),
+    "on a block 3:4": (3, 4, 1.0, STRAIGHT),
+    "on a block 4:3": (4, 3, 1.0, STRAIGHT),
     "on a block 3:4, turned by 20 degrees": (3, 4, 1.0, TURN),
-    "on a block 3:4, lower one 10 times stiffer": (3, 4, 0.1, None),
-    "on a block 3:4, upper one 10 times stiffer": (3, 4, 10.0, None),
+    "on a block 3:4, lower one 10 times stiffer": (3, 4, 0.1, STRAIGHT),
+    "on a block 3:4, upper one 10 times stiffer": (3, 4, 10.0, STRAIGHT),
 }
 SHEET, SHEET_CELLS = (0.3, 0.3, 0.02), (12, 12, 1)  # [m]
 TIPS = np.array([[-0.03, -0.025], [0.035, -0.02], [0.005, 0.04]])  # (x, y) [m]
@@ -64,8 +66,13 @@ def rubber(stiff: float = 1.0) -> wc.NeoHookean:
     return wc.NeoHookean(stiff * YOUNG, POISSON, DENSITY, DAMPING)
 
 
-def settled(ask: Ask, scene: wc.Scene, penalty: tuple[float, float] = PENALTY) -> wc.Simulation:
-    """A scene after it came to rest."""
+def settled(ask: Ask, bodies: list, friction=0.3, penalty=PENALTY, plane=False) -> wc.Simulation:
+    """A scene of bodies, each the arguments of ``add_body``, after it came to rest."""
+    scene = wc.Scene((0.0, 0.0, -G), friction)
+    for body in bodies:
+        scene.add_body(*body)
+    if plane:
+        scene.add_plane((0.0, 0.0, 1.0))
     sim = wc.Simulation(scene, ask.respond(*penalty), fps=FPS)
     watch(sim, SETTLE)
     return sim
@@ -80,40 +87,32 @@ def steady(label: str, name: str, mean: float, force: np.ndarray, weight: float)
 
 def stacked(label: str, stack: tuple, ask: Ask) -> Figures:
     """Let a stack come to rest, then watch the forces between all that touches."""
-    lower, upper, ratio, rotation = stack
-    scene = wc.Scene(gravity=(0.0, 0.0, -G))
-    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    lower, upper, ratio, turn = stack
     soft = max(1.0, 1.0 / ratio)
-    scene.add_body(wc.box(EDGE, lower), rubber(soft), (0, 0, 0.5 * EDGE + GAP), label="lower")
+    bodies = [(wc.box(EDGE, lower), rubber(soft), (0, 0, 0.5 * EDGE + GAP))]
     if upper:
-        turn = rotation or (0.0, 0.0, 0.0, 1.0)
         place = (0.0, 0.0, 1.5 * EDGE + 2.0 * GAP)
-        scene.add_body(wc.box(EDGE, upper), rubber(ratio * soft), place, turn, label="upper")
-    carried = {("lower", "plane0"): len(scene.bodies) * WEIGHT}
-    carried |= {("lower", "upper"): WEIGHT} if upper else {}
-    sim = settled(ask, scene)
-
-    def look() -> tuple[float, ...]:
-        return *forces(sim, *carried), sim.measure().overlap
-
-    *found, overlap = watch(sim, STACK_SAMPLE, look).T
-    for (first, second), weight, force in zip(carried, carried.values(), found, strict=True):
-        yield from steady(label, f", {second} on {first}", force.mean(), force, weight)
-    edge = float(sim.model.body_edge.numpy().min())
-    yield Figure(label, "deepest overlap [% of an edge]", 100.0 * overlap.max() / edge, most=0.1)
+        bodies.append((wc.box(EDGE, upper), rubber(ratio * soft), place, turn))
+    carried = {("body0", "plane0"): ("plane0 on lower", len(bodies) * WEIGHT)}
+    carried |= {("body0", "body1"): ("upper on lower", WEIGHT)} if upper else {}
+    sim = settled(ask, bodies, plane=True)
+    found = watch(sim, STACK_SAMPLE, lambda: (*forces(sim, *carried), sim.measure().overlap)).T
+    for (name, weight), force in zip(carried.values(), found[:-1], strict=True):
+        yield from steady(label, f", {name}", force.mean(), force, weight)
+    overlap = 100.0 * found[-1].max() / float(sim.model.body_edge.numpy().min())
+    yield Figure(label, "deepest overlap [% of an edge]", overlap, most=0.1)
     yield Figure(label, "kinetic energy at the end [J]", sim.measure().kinetic)
 
 
 def centre(label: str, ask: Ask) -> Figures:
     """Moment balance about the centre of mass, from the pressure at the vertices."""
-    scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=0.0)
-    scene.add_plane((0.0, 0.0, 1.0), 0.0)
-    scene.add_body(wc.box(EDGE, 3), rubber(), (0.0, 0.0, 0.5 * EDGE))
-    sim = settled(ask, scene)
+    block = wc.box(EDGE, 3), rubber(), (0.0, 0.0, 0.5 * EDGE)
+    sim = settled(ask, [block], friction=0.0, plane=True)
     mass = masses(sim)
 
     def look() -> tuple[float, ...]:
-        force, x = sim.contact_fields()["pressure"] * vertex_areas(sim), sim.positions()
+        area, x = vertex_area(sim.model, sim.state.x), sim.positions()
+        force = sim.contact_fields()["pressure"] * area
         moment = force @ x.astype(float) - force.sum() * (mass @ x) / mass.sum()
         return *moment[:2], force.sum()
 
@@ -125,33 +124,28 @@ def centre(label: str, ask: Ask) -> Figures:
 
 def on_sheet(label: str, ask: Ask) -> Figures:
     """The block on a membrane held at its rim."""
-    scene = wc.Scene(gravity=(0.0, 0.0, -G))
     sheet = wc.box(SHEET, SHEET_CELLS)
     rim = np.abs(sheet.vertices[:, :2]).max(axis=1) > 0.499 * SHEET[0]
-    scene.add_body(sheet, rubber(20.0), fixed=rim, label="sheet")
     place = (0.0, 0.0, 0.5 * SHEET[2] + 1e-3 + 0.5 * EDGE)
-    scene.add_body(wc.box(EDGE, 3), rubber(), place, label="block")
-    sim = settled(ask, scene)
-    force = watch(sim, SAMPLE, lambda: forces(sim, ("sheet", "block")))
+    sheet = sheet, rubber(20.0), (0, 0, 0), STRAIGHT, (0, 0, 0), rim
+    sim = settled(ask, [sheet, (wc.box(EDGE, 3), rubber(), place)])
+    force = watch(sim, SAMPLE, lambda: forces(sim, ("body0", "body1")))
     yield from steady(label, "", force.mean(), force, WEIGHT)
 
 
 def on_points(label: str, ask: Ask) -> Figures:
     """The block on three tips."""
-    scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=GRIP)
     angle = 2.0 * np.pi * np.arange(3) / 3.0
     foot = 0.5 * SPIKE * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle - 2.0], axis=1)
     spike = wc.TetMesh(np.vstack([np.zeros((1, 3)), foot]), [[0, 1, 2, 3]])
     material = wc.NeoHookean(YOUNG, POISSON, DENSITY)
-    for k, (x, y) in enumerate(TIPS):
-        scene.add_body(spike, material, (x, y, 0.0), fixed=True, label=f"tip{k}")
-    scene.add_body(wc.box(EDGE, 4), rubber(STIFF), (0.0, 0.0, 1e-4 + 0.5 * EDGE), label="block")
-    sim = settled(ask, scene, ON_TIP)
-    pairs = [(f"tip{k}", "block") for k in range(3)]
+    bodies = [(spike, material, (x, y, 0.0), STRAIGHT, (0, 0, 0), True) for x, y in TIPS]
+    bodies.append((wc.box(EDGE, 4), rubber(STIFF), (0.0, 0.0, 1e-4 + 0.5 * EDGE)))
+    sim = settled(ask, bodies, GRIP, ON_TIP)
+    pairs = [(f"body{k}", "body3") for k in range(3)]
     mean = watch(sim, SAMPLE, lambda: forces(sim, *pairs)).mean(axis=0)
     mass, x = masses(sim, 3), sim.positions(3).astype(float)
-    at = (mass @ x / mass.sum())[:2]
-    part = np.linalg.solve(np.vstack([TIPS.T, np.ones(3)]), [*at, 1.0])
+    part = np.linalg.solve(np.vstack([TIPS.T, np.ones(3)]), [*(mass @ x / mass.sum())[:2], 1.0])
     for k, force in enumerate(mean):
         yield relative(label, f"mean force on tip {k} [N]", force, part[k] * WEIGHT, FORCE)
 
@@ -175,8 +169,7 @@ def carry(ask: Ask, ratio: float) -> Figures:
     """Mean and ripple of the force on the light cube's top, and the overlap there."""
     label = f"A7m heavy on light, mass ratio {ratio:g}"
     young = 20.0 * ratio * DENSITY * G * EDGE
-    pile = cubes(ratio, young)
-    sim = pile.simulate(ask, 0.0)
+    sim = cubes(ratio, young).simulate(ask, 0.0)
     omega = float(np.sqrt(young * EDGE / (ratio * DENSITY * EDGE**3)))
     force = rest(sim, omega, REST, lambda: between(sim), 0.5, LEAST)[:, 0]
     blocks = force[: len(force) // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)

@@ -6,6 +6,7 @@ from warp_contact.kernels.lengths import REST_GAP, SAME_PLACE
 
 ROUNDING = 2.0**-24  # of a float32, at most
 DROWNED = 10.0  # resting gaps by which rounding may move a body: soft ones tolerate it
+STRAINED = 0.02  # strain that rounding of the positions may put on a tet
 
 
 def check(bodies: list) -> None:
@@ -13,7 +14,8 @@ def check(bodies: list) -> None:
 
     Raises:
         ValueError: naming a body that is so far from the origin that rounding moves it by
-            ``DROWNED`` resting gaps, or two of one world, not both fixed, that fill the same space:
+            ``DROWNED`` resting gaps, or a tet so flat that rounding strains it by more than
+            ``STRAINED``, or two of one world, not both fixed, that fill the same space:
             neither is inside the other, and no direction leads out
     """
     edges = [_mean_edge(body) for body in bodies]
@@ -23,6 +25,12 @@ def check(bodies: list) -> None:
             raise ValueError(
                 f"body '{body.label}' is {far:.4g} m from the origin: beyond {most:.4g} m, "
                 f"rounding is {DROWNED:g} times its gap at rest; place the scene about the origin"
+            )
+        strain = far * ROUNDING / _heights(body)
+        if strain.max() > STRAINED:
+            raise ValueError(
+                f"body '{body.label}', tet {int(strain.argmax())} is too flat: rounding of its "
+                f"positions would strain it by {strain.max():.2g}; remesh it"
             )
     shape = np.array([_shape(body) for body in bodies])
     slack = SAME_PLACE * np.array(edges)
@@ -62,6 +70,14 @@ def _shape(body) -> np.ndarray:
     n = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
     radius = np.sqrt(np.einsum("ai,ij,aj->a", n, square / 20.0, n))
     return np.concatenate([body.x.min(axis=0), body.x.max(axis=0), middle, radius])
+
+
+def _heights(body) -> np.ndarray:
+    """Least height of each tet [m], shape (n_tet,)."""
+    a, b, c, d = np.moveaxis(body.mesh.vertices[body.mesh.tets], 1, 0)
+    faces = ((b, c, d), (a, c, d), (a, b, d), (a, b, c))
+    doubled = [np.linalg.norm(np.cross(q - p, r - p), axis=1) for p, q, r in faces]
+    return 6.0 * body.mesh.volumes / np.max(doubled, axis=0)
 
 
 def _mean_edge(body) -> float:

@@ -42,12 +42,11 @@ def test_overlap_and_inverted_tets_are_counted():
 
 def test_a_run_without_a_motion_gives_its_reason_and_time():
     import race
-    from engines.task import Failed, Task
+    from engines.task import Motion, Task
 
-    task = Task(blocks, 60, 2)
-    line = race.row("blocks", task, "engine", Failed("too slow: 3 of 60 frames in 20 s", 412.3))
-    assert line.split()[:3] == ["blocks", "engine", "412"]
-    assert line.endswith("too slow: 3 of 60 frames in 20 s")
+    motion = Motion(wall=412.3, reason="too slow: 3 of 60 frames in 20 s")
+    cells = race.cells(Task(blocks, 60, 2), motion)
+    assert cells == ["", "412", "", "", "too slow: 3 of 60 frames in 20 s"]
 
 
 def test_every_scene_of_the_race_can_be_built():
@@ -60,12 +59,12 @@ def test_every_scene_of_the_race_can_be_built():
 
 
 def test_every_setting_has_a_value_for_each_knob():
+    import pareto
     import race
-    from engines import outside, settings
+    from engines import runs
 
-    for engine, rows in race.SETTINGS.items():
-        assert all(len(row) == len(settings.SWEEPS[engine][0]) for row in rows)
-    for engine in outside.ADAPTERS:
-        quick, full = (settings.outside(engine, q) for q in (True, False))
-        assert quick == full[: settings.FEW] and len(full) == 10
-        assert len({tuple(setting.values()) for setting in full}) == 10
+    for engine, settings in runs.SWEEPS.items():
+        rows = {tuple(setting.values()) for setting in settings}
+        assert len(rows) == len(settings) == 10 > pareto.FEW
+        assert set(race.SETTINGS[engine]) <= set(range(10))
+    assert set(race.SETTINGS) == set(runs.SWEEPS) == set(runs.ENGINES)

@@ -12,133 +12,103 @@ panels and summary.png with four of them, and pareto.txt. ``--draw`` measures no
 pictures of a table again, beside it.
 """
 
-import statistics
 import sys
-from collections.abc import Iterator
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from statistics import median
 from time import perf_counter
 
-from chart import closed_forms, points, scenes, words
+from chart import closed_forms, points, scenes
 from chart.panel import Panel
 from chart.points import Point
-from engines import outside, settings
-from engines.runs import Run, runs
-from engines.task import Failed, Task
+from engines import ours
+from engines.runs import SWEEPS, runs, versions
+from engines.task import Failed, Motion, Task
 from measure import machine
 from measure.run import command_line, count, one_of
 
-TASKS = {
-    "A1": closed_forms.springs,
-    "A3": closed_forms.pressed,
-    "A6": closed_forms.free,
-    "A7m": closed_forms.ladder,
-    "squeezed_sphere": partial(scenes.scene, "squeezed_sphere"),
-    "cubes_on_membrane": partial(scenes.scene, "cubes_on_membrane"),
-}
+TASKS = *closed_forms.TASKS, *scenes.TITLES
 LIMIT, QUICK_LIMIT = 12.0, 6.0  # wall seconds of one run
 REPEATS = 3  # of everything, in turn; times are medians
+FEW = 5  # settings of each engine outside in the quick run
+HEAD = """Error against wall time, {} run(s) of each, {:.0f} s in all.
+{}; outside: {}.
+Kernels are compiled and the first frame is stepped before the clock starts. Failures are behind \
+everything. Error and time of a method are those of the same setting."""
 
 
 def main() -> int:
     """Run, draw, write."""
     parser = command_line(__doc__)
     parser.add_argument("tasks", nargs="*", type=one_of(TASKS), metavar="task", help="or all")
-    parser.add_argument("--quick", action="store_true", help="fewer settings, each once")
+    parser.add_argument("--quick", action="store_true", help="fewer settings, each once, short")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "pareto")
     parser.add_argument("--python", default=sys.executable, help="interpreter with the engines")
     parser.add_argument("--repeats", type=count, help=f"{REPEATS}, quick: 1")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="a table to draw again")
     args = parser.parse_args()
-    chosen = {name: TASKS[name](args.quick) for name in args.tasks or TASKS}
-    titles = {panel.name: panel.title for _, panels in chosen.values() for panel in panels}
+    tasks = closed_forms.TASKS | {n: scenes.scene(n, args.quick) for n in scenes.TITLES}
+    chosen = [tasks[name] for name in args.tasks or TASKS]
+    titles = {panel.name: panel.title for _, panels in chosen for panel in panels}
     if args.draw:
-        draw(args.draw.parent, titles, points.read(args.draw))
+        draw(args.draw.parent, titles, shown(points.read(args.draw)))
         return 0
-    others = {engine: settings.outside(engine, args.quick) for engine in settings.SWEEPS}
-    limit = QUICK_LIMIT if args.quick else LIMIT
-    begin, rounds = perf_counter(), []
+    own, few, limit = (ours.QUICK, FEW, QUICK_LIMIT) if args.quick else (ours.ALL, None, LIMIT)
+    others = {engine: settings[:few] for engine, settings in SWEEPS.items()}
+    begin, rounds, outside = perf_counter(), [], versions(args.python)
     for _ in range(args.repeats or (1 if args.quick else REPEATS)):
         rounds.append([])
-        for task, panels in chosen.values():
-            for run in runs(task, settings.own(args.quick), others, args.python, limit):
-                rounds[-1] += judge(task, panels, run)
+        for task, panels in chosen:
+            for run in runs(task, own, others, args.python, limit):
+                rounds[-1] += judge(task, panels, *run)
         # After every round: a long run leaves what it has.
-        found = choose([median(same) for same in zip(*rounds, strict=True)])
-        save(args.out, head(args.python, len(rounds), perf_counter() - begin), titles, found)
-        draw(args.out, titles, found)
+        found = [middle(same) for same in zip(*rounds, strict=True)]
+        head = HEAD.format(len(rounds), perf_counter() - begin, machine.line("cpu"), outside)
+        args.out.mkdir(parents=True, exist_ok=True)
+        points.write(args.out / "pareto.csv", found)
+        text = points.report(head, titles, shown(found))
+        (args.out / "pareto.txt").write_text(text, encoding="utf-8")
+        print(text)
+        draw(args.out, titles, shown(found))
     return 0
 
 
-def judge(task: Task, panels: list[Panel], run: Run) -> Iterator[Point]:
-    """The errors of a run in all panels, printed as they come."""
-    method, setting, motion = run
+def judge(task: Task, panels: list[Panel], method: str, setting: str, motion: Motion):
+    """The points of a run in all panels, printed as they come."""
     for panel in panels:
-        point = Point(panel.name, method, setting, motion.wall, None)
+        error, outcome = None, motion.reason
         try:
-            if isinstance(motion, Failed):
-                raise motion
-            point = replace(point, startup=motion.startup)
-            point = replace(point, error=panel.error(task, motion))
+            if not outcome:
+                error, outcome = panel.error(task, motion), "ok"
         except Failed as failed:
-            point = replace(point, outcome=str(failed))
-        print(*point.cells(), sep="  ", flush=True)
+            outcome = str(failed)
+        point = Point(panel.name, method, setting, motion.wall, error, outcome, motion.startup)
+        print(*point, sep="  ", flush=True)
         yield point
 
 
-def median(same: tuple[Point, ...]) -> Point:
+def middle(same: tuple[Point, ...]) -> Point:
     """Repeats of a point as one; a run that fails once has failed."""
-    failed = next((p for p in same if p.failed), None)
-    return failed or replace(same[0], wall=statistics.median(p.wall for p in same))
+    failed = [p for p in same if p.error is None]
+    return failed[0] if failed else same[0]._replace(wall=median(p.wall for p in same))
 
 
-def choose(found: list[Point]) -> list[Point]:
-    """Of the penalties of a panel, show those with the best stiffness only."""
-    best = {}
-    for p in found:
-        if p.method == "penalty" and not p.failed and p.error <= best.get(p.panel, p).error:
-            best[p.panel] = p
+def shown(found: list[Point]) -> list[Point]:
+    """Of the penalties of a panel those with the best stiffness only, and everything else."""
+    penalties = [p for p in found if p.method == "penalty" and p.error is not None]
+    worst_first = sorted(penalties, key=points.BY_ERROR, reverse=True)
+    best = {p.panel: p.setting.partition("steps")[0] for p in worst_first}
     return [
-        replace(p, shown=p.method != "penalty" or stiffness(p) == stiffness(best.get(p.panel, p)))
-        for p in found
+        p for p in found if p.method != "penalty" or p.setting.startswith(best.get(p.panel, ""))
     ]
 
 
-def stiffness(point: Point) -> str:
-    """Of a penalty, as its setting says it."""
-    return point.setting.split(",")[0]
-
-
-def save(folder: Path, first: str, titles: dict[str, str], found: list[Point]) -> None:
-    """Table and words."""
-    folder.mkdir(parents=True, exist_ok=True)
-    points.write(folder / "pareto.csv", found)
-    text = words.report(first, titles, found)
-    (folder / "pareto.txt").write_text(text, encoding="utf-8")
-    print(text)
-
-
 def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:
-    """Where matplotlib is installed, the picture of all panels and that of four."""
-    try:
-        from chart import picture
-    except ImportError:
-        print("no picture: matplotlib is not installed (extra 'plot')")
-        return
+    """The picture of all panels and that of four."""
+    from chart import picture  # matplotlib: the table needs none
+
     picture.draw(folder / "pareto.png", titles, found)
     if {p.panel for p in found}.issuperset(picture.SUMMARY):
         picture.draw(folder / "summary.png", picture.SUMMARY, found)
-
-
-def head(python: str, repeats: int, seconds: float) -> str:
-    """Date, machine, versions, rules."""
-    return (
-        f"Error against wall time, {repeats} run(s) of each, {seconds:.0f} s in all.\n"
-        f"{machine.line('cpu')}; outside: {outside.versions(python)}.\n"
-        "Kernels are compiled and the first frame is stepped before the clock starts. Failures are "
-        "behind everything. Error and time of a method are those of the same setting."
-    )
 
 
 if __name__ == "__main__":

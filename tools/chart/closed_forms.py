@@ -6,105 +6,72 @@ material damps stiffness-proportionally where the state of rest is asked for, wi
 coefficient for all.
 """
 
-from functools import cache
+from functools import partial
 
 import numpy as np
 from engines.task import Failed, Motion, Task
+from measure.figure import rms
 from verification import collision, hertz, weight
 from verification.columns import Column, Pile
 from verification.setup import G, on_face
 
 import warp_contact as wc
-from chart.laws import STEPS, squeeze
-from chart.panel import Panel, late, sound
+from chart.panel import Elastic, Panel, late, sound
 
-Shown = tuple[Task, list[Panel]]
 ZETA = 0.35  # damping ratio of the slowest mode, where bodies come to rest
 
 
-def lowered(scene: wc.Scene, v: float) -> wc.Scene:
-    """The scene, with the held vertices of its last body moving down at v [m/s]."""
+def lower(scene: wc.Scene, way: float, frames: int, fps: float) -> wc.Scene:
+    """The scene, with the held vertices of its last body on a way down [m] of so many frames."""
     body = scene.bodies[-1]
-    body.v[body.fixed] = 0.0, 0.0, -v
+    body.v[body.fixed] = 0.0, 0.0, -way * fps / frames
     return scene
 
 
 # A1: the upper column, ten times stiffer, is pushed onto the lower one; exact is where two bars of
-# the engine's own law carry the same pressure.
+# the engine's own law carry the same pressure, at a height for which there is a test.
 
 SOFT, STIFF, OVERLAP, SPACE = 1e5, 1e6, 0.1, 0.02  # [Pa], [Pa], [m], [m]
-PUSH, SETTLE, PUSH_FPS = 0.3, 1.0, 60  # [s], [s], [1/s]
+MEETING = {"neo-hookean": 0.9090045427235175, "st-venant": 0.9080619982174014}  # height [m]
 SPEED = 10.0  # of the waves in both columns [m/s]
-CELLS, QUICK_CELLS = ((3, 3, 6), (4, 4, 6)), ((2, 2, 4), (3, 3, 4))
+PUSH, PUSH_FPS = 18, 60  # frames, [1/s]
 
 
-def springs(quick: bool) -> Shown:
-    """A1."""
-    push, beta = round(PUSH * PUSH_FPS), 2.0 * ZETA / (0.5 * np.pi * SPEED)
+def springs() -> wc.Scene:
+    """Both columns."""
     columns = [
-        Column(young, 1.0, young / SPEED**2, cells, damping=beta)
-        for young, cells in zip((SOFT, STIFF), QUICK_CELLS if quick else CELLS, strict=True)
+        Column(young, 1.0, young / SPEED**2, cells, damping=2.0 * ZETA / (0.5 * np.pi * SPEED))
+        for young, cells in ((SOFT, (3, 3, 6)), (STIFF, (4, 4, 6)))
     ]
-
-    def build() -> wc.Scene:
-        scene = Pile(columns, SPACE, clamped=True).build(wc.NeoHookean)
-        return lowered(scene, (OVERLAP + SPACE) * PUSH_FPS / push)
-
-    task = Task(build, PUSH_FPS, push + round(SETTLE * PUSH_FPS), SOFT / 16.0, stop=push)
-    title = "A1 series springs 1:10\nplace of the surface [of the overlap]"
-    return task, [Panel("A1", title, place)]
+    scene = Pile(columns, SPACE, clamped=True).build(wc.NeoHookean)
+    return lower(scene, OVERLAP + SPACE, PUSH, PUSH_FPS)
 
 
 def place(task: Task, motion: Motion) -> float:
     """How far the mean heights of both faces are off, the worse of the two [of the overlap]."""
-    whole, _ = sound(task, motion)
-    exact, worst = meeting(motion.law), 0.0
-    for k, (body, part) in enumerate(zip(task.scene().bodies, whole.parts, strict=True)):
-        z = motion.x[late(task), part, 2][:, on_face(body.mesh, 2, 1 - 2 * k)]
-        worst = max(worst, abs(float(z.mean()) - exact) / OVERLAP)
-    return worst
-
-
-@cache
-def meeting(law: str) -> float:
-    """Height at which both columns carry the same pressure [m]."""
-    soft, stiff = (body.material.lame() for body in springs(True)[0].scene().bodies)
-    p = 0.0
-    for _ in range(STEPS):
-        gap = 2.0 - OVERLAP - squeeze(p, *soft, law) - squeeze(p, *stiff, law)
-        p -= gap / (1.0 / SOFT + 1.0 / STIFF)
-    return squeeze(p, *soft, law)
+    parts, bodies = sound(task, motion).parts, task.scene().bodies
+    faces = [on_face(body.mesh, 2, side) for body, side in zip(bodies, (1, -1), strict=True)]
+    z = [motion.x[late(task), p, 2][:, face].mean() for p, face in zip(parts, faces, strict=True)]
+    return float(np.abs(np.array(z, dtype=float) - MEETING[motion.law]).max() / OVERLAP)
 
 
 # A3: the cap of a sphere pressed onto a plane by a given depth.
 
-FINE, QUICK_FINE = 2, 1  # elements across the radius of contact
-HERTZ_PUSH, HERTZ_SETTLE, HERTZ_FPS = 0.01, 0.015, 1000  # [s], [s], [1/s]
-HERTZ_SPACE = 1e-4  # at the start [m]
-E_STAR = hertz.modulus(hertz.YOUNG)
-CONTACT = hertz.contact_radius(hertz.LOADS[1], hertz.RADIUS, E_STAR)  # radius [m]
+FINE = 2  # elements across the radius of contact
+PRESS, PRESS_FPS = 10, 1000  # frames, [1/s]
+SLIT = 1e-4  # at the start [m]
 
 
-def pressed(quick: bool) -> Shown:
-    """A3."""
-    n = QUICK_FINE if quick else FINE
-    depth = CONTACT**2 / hertz.RADIUS
-    push = round(HERTZ_PUSH * HERTZ_FPS)
-
-    def build() -> wc.Scene:
-        scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
-        scene.add_plane((0.0, 0.0, 1.0), 0.0)
-        mesh = hertz.cap(hertz.RADIUS, CONTACT / n, hertz.RINGS[n])
-        omega = 0.5 * np.pi * hertz.pressure_wave(hertz.YOUNG) / hertz.HEIGHT
-        rubber = wc.NeoHookean(hertz.YOUNG, hertz.POISSON, hertz.DENSITY, 2.0 * ZETA / omega)
-        held = mesh.vertices[:, 2] > 0.999 * hertz.HEIGHT
-        scene.add_body(mesh, rubber, (0.0, 0.0, HERTZ_SPACE), fixed=held)
-        return lowered(scene, (depth + HERTZ_SPACE) * HERTZ_FPS / push)
-
-    frames = push + round(HERTZ_SETTLE * HERTZ_FPS)
-    task = Task(build, HERTZ_FPS, frames, hertz.YOUNG * CONTACT / n, stop=push)
-    title = f"A3 Hertz, {n} element(s) across\npressure at the middle [of exact]"
-    return task, [Panel("A3", title, peak)]
+def ball() -> wc.Scene:
+    """The cap above the plane."""
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.0)
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    mesh = hertz.cap(hertz.RADIUS, hertz.CONTACT / FINE, hertz.RINGS[FINE])
+    omega = 0.5 * np.pi * hertz.pressure_wave(hertz.YOUNG) / hertz.HEIGHT
+    rubber = wc.NeoHookean(hertz.YOUNG, hertz.POISSON, hertz.DENSITY, 2.0 * ZETA / omega)
+    held = mesh.vertices[:, 2] > 0.999 * hertz.HEIGHT
+    scene.add_body(mesh, rubber, (0.0, 0.0, SLIT), fixed=held)
+    return lower(scene, hertz.CONTACT**2 / hertz.RADIUS + SLIT, PRESS, PRESS_FPS)
 
 
 def peak(task: Task, motion: Motion) -> float:
@@ -114,47 +81,24 @@ def peak(task: Task, motion: Motion) -> float:
     plane above makes the body stiffer, and the mesh has its error too: whoever comes to rest on it
     meets at that floor, not at zero.
     """
-    _, solid = sound(task, motion)
+    solid = sound(task, motion)
     body = task.scene().bodies[0]
     force = np.mean([solid.forces(x) for x in motion.x[late(task)]], axis=0)
-    under = hertz.on_ball(body)
-    lowest = np.flatnonzero(under)[np.hypot(*body.mesh.vertices[under, :2].T).argmin()]
-    p = -force[lowest, 2] / areas(body.mesh)[lowest]
-    p0 = 2.0 * E_STAR * CONTACT / (np.pi * hertz.RADIUS)
-    return abs(float(p) / p0 - 1.0)
-
-
-def areas(mesh: wc.TetMesh) -> np.ndarray:
-    """A third of the surface around each vertex [m^2]."""
-    a, b, c = np.moveaxis(mesh.vertices[mesh.surface], 1, 0)
-    third = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(mesh.surface.ravel(), np.repeat(third, 3), minlength=len(mesh.vertices))
+    under = np.flatnonzero(hertz.on_ball(body))
+    lowest = under[np.hypot(*body.mesh.vertices[under, :2].T).argmin()]
+    around = body.mesh.surface[(body.mesh.surface == lowest).any(axis=1)]
+    a, b, c = np.moveaxis(body.mesh.vertices[around], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 6.0  # a third of the triangles
+    p0 = 2.0 * hertz.E_STAR * hertz.CONTACT / (np.pi * hertz.RADIUS)
+    return abs(float(-force[lowest, 2] / area / p0) - 1.0)
 
 
 # A6: two undamped free blocks, the second ten times as dense, meet head-on.
 
-DENSER = 10.0
-FREE_FPS, FREE_TIME = 240, 0.25  # [1/s], [s]
-
-
-def free(quick: bool) -> Shown:
-    """A6: momentum and energy; the quick run is the same."""
-    del quick
-
-    def build() -> wc.Scene:
-        return collision.thrown((3, 5), "head-on", DENSER)
-
-    title = "A6 free collision 1:10\n{} [of that at the start]"
-    panels = [
-        Panel("A6p", title.format("change of momentum"), drift),
-        Panel("A6e", title.format("energy gained or lost"), work),
-    ]
-    return Task(build, FREE_FPS, round(FREE_TIME * FREE_FPS), 500.0), panels
-
 
 def drift(task: Task, motion: Motion) -> float:
     """Largest change of momentum after any frame, of sum m |v| at the start."""
-    m = met(task, motion)[0].mass
+    m = parted(task, motion).mass
     p = np.einsum("i,fij->fj", m, motion.v.astype(float))
     scale = m @ np.linalg.norm(motion.v[0], axis=1)
     return float(np.linalg.norm(p - p[0], axis=1).max() / scale)
@@ -165,51 +109,35 @@ def work(task: Task, motion: Motion) -> float:
 
     Undamped and without friction exact is none; a loss counts as well as a gain.
     """
-    whole, solid = met(task, motion)
-
-    def energy(k: int) -> float:
-        kinetic = 0.5 * whole.mass @ (motion.v[k].astype(float) ** 2).sum(axis=1)
-        return kinetic + solid.energy(motion.x[k])
-
-    end = range(task.frames + 1 - task.frames // 3, task.frames + 1)
-    return abs(float(np.mean([energy(k) for k in end])) / energy(0) - 1.0)
+    solid = parted(task, motion)
+    energy = 0.5 * (motion.v.astype(float) ** 2).sum(axis=2) @ solid.mass
+    energy += [solid.energy(x) for x in motion.x]
+    return abs(float(energy[late(task, 1.0 / 3.0)].mean() / energy[0]) - 1.0)
 
 
-def met(task: Task, motion: Motion):
+def parted(task: Task, motion: Motion) -> Elastic:
     """As ``sound``; ``Failed`` as well unless the blocks have met and parted."""
-    found = whole, _ = sound(task, motion)
-    first, second = (motion.v[-1, part, 2].mean() for part in whole.parts)
+    solid = sound(task, motion)
+    first, second = (motion.v[-1, part, 2].mean() for part in solid.parts)
     if not second - first > 0.0:
         raise Failed("the blocks do not part")
-    return found
+    return solid
 
 
 # A7m: a light cube carries one a hundred times as dense; they start where linear bars would rest,
 # and their damping takes 1.25 s until less than 0.01 % of the weight is left of that error.
 
 RATIO = 100.0
-EDGE, LIGHT = weight.EDGE, weight.DENSITY  # [m], [kg/m^3]
-LADDER_FPS, LADDER_TIME = 240, 1.5  # [1/s], [s]
-LADDER_ZETA = 0.1  # a small part of the rate at which the light cube alone would be damped
+HEAVY = RATIO * weight.DENSITY  # [kg/m^3]
+STIFFNESS = 20.0 * HEAVY * G * weight.EDGE  # 5 % of strain [Pa]
+OMEGA = np.sqrt(STIFFNESS / HEAVY) / weight.EDGE
+# The damping ratio is a small part of the rate at which the light cube alone would be damped.
+CUBES = weight.cubes(RATIO, STIFFNESS, 2.0 * 0.1 / OMEGA)
 
 
-def ladder(quick: bool) -> Shown:
-    """A7m; the quick run is the same."""
-    del quick
-    young = 20.0 * RATIO * LIGHT * G * EDGE  # 5 % of strain
-    omega = np.sqrt(young / (RATIO * LIGHT)) / EDGE
-    pile = weight.cubes(RATIO, young, 2.0 * LADDER_ZETA / omega)
-
-    def build() -> wc.Scene:
-        return pile.build(wc.NeoHookean)
-
-    def start(scene: wc.Scene) -> np.ndarray:
-        return np.concatenate(pile.static(scene))
-
-    frames = round(LADDER_TIME * LADDER_FPS)
-    task = Task(build, LADDER_FPS, frames, 0.1 * young * EDGE, start=start)
-    title = f"A7m heavy on light 1:{RATIO:g}\nforce and its ripple [of the weight]"
-    return task, [Panel("A7m", title, carried)]
+def resting(scene: wc.Scene) -> np.ndarray:
+    """Where linear bars rest [m]."""
+    return np.concatenate(CUBES.static(scene))
 
 
 def carried(task: Task, motion: Motion) -> float:
@@ -217,9 +145,39 @@ def carried(task: Task, motion: Motion) -> float:
 
     The force is what its stresses hand to its held base, less its own weight.
     """
-    whole, solid = sound(task, motion)
-    light, heavy = whole.parts
+    solid = sound(task, motion)
+    light, heavy = solid.parts
     base = task.scene().bodies[0].fixed
-    own, load = whole.mass[light][~base].sum() * G, whole.mass[heavy].sum() * G
+    own, load = solid.mass[light][~base].sum() * G, solid.mass[heavy].sum() * G
     forces = [-solid.forces(x)[light][base, 2].sum() - own for x in motion.x[late(task)]]
-    return float(np.sqrt(np.mean(np.square(np.array(forces) / load - 1.0))))
+    return rms(np.array(forces) / load - 1.0)
+
+
+COLLISION = "A6 free collision 1:10\n{} [of that at the start]"
+TASKS = {  # and their panels
+    "A1": (
+        Task(springs, PUSH_FPS, PUSH + 60, SOFT / 16.0, stop=PUSH),
+        [Panel("A1", "A1 series springs 1:10\nplace of the surface [of the overlap]", place)],
+    ),
+    "A3": (
+        Task(ball, PRESS_FPS, PRESS + 15, hertz.YOUNG * hertz.CONTACT / FINE, stop=PRESS),
+        [Panel("A3", "A3 Hertz, 2 element(s) across\npressure at the middle [of exact]", peak)],
+    ),
+    "A6": (
+        Task(partial(collision.thrown, (3, 5), "head-on", 10.0), 240, 60, 500.0),
+        [
+            Panel("A6p", COLLISION.format("change of momentum"), drift),
+            Panel("A6e", COLLISION.format("energy gained or lost"), work),
+        ],
+    ),
+    "A7m": (
+        Task(
+            partial(CUBES.build, wc.NeoHookean),
+            240,
+            360,
+            0.1 * STIFFNESS * weight.EDGE,
+            start=resting,
+        ),
+        [Panel("A7m", "A7m heavy on light 1:100\nforce and its ripple [of the weight]", carried)],
+    ),
+}

@@ -11,23 +11,25 @@ PARALLEL = 1e-12  # determinant over the product of its terms below which it cou
 
 
 def distance(xa: np.ndarray, ta: np.ndarray, xb: np.ndarray, tb: np.ndarray) -> float:
-    """Smallest distance [m] of two surfaces; 0 where they cross.
+    """Smallest distance [m] of two surfaces of vertices (n, 3) and triangles (m, 3).
 
-    Args:
-        xa: vertices of the first [m], shape (n, 3); those that no triangle has do not count
-        ta: its triangles, shape (m, 3)
-        xb: vertices of the second
-        tb: its triangles
+    It is 0 where they cross; vertices that no triangle has do not count.
     """
-    xa, xb = np.asarray(xa, dtype=float), np.asarray(xb, dtype=float)
-    ea, eb = edges(ta), edges(tb)
-    if crosses(xa[ea], xb[tb]) or crosses(xb[eb], xa[ta]):
-        return 0.0
-    return min(
-        points_triangles(xa[np.unique(ta)], xb[tb]),
-        points_triangles(xb[np.unique(tb)], xa[ta]),
-        segments_segments(xa[ea], xb[eb]),
-    )
+    surfaces = (np.asarray(xa, dtype=float), ta), (np.asarray(xb, dtype=float), tb)
+    a, b = ((x[np.unique(tris)], x[edges(tris)], x[tris]) for x, tris in surfaces)
+    near = segments_segments(a[1], b[1])
+    for (points, segments, _), (_, _, triangles) in ((a, b), (b, a)):
+        start, end = segments[:, None, 0], segments[:, None, 1]
+        low, high = over(start, triangles)[0], over(end, triangles)[0]
+        through = low * high < 0.0
+        at = low / np.where(through, low - high, 1.0)
+        _, inside = over(start + at[..., None] * (end - start), triangles)
+        if (through & inside).any():
+            return 0.0
+        # Points that face no inside are at best as near as an edge.
+        height, inside = over(points[:, None], triangles)
+        near = min(near, np.min(np.abs(height[inside]), initial=np.inf))
+    return float(near)
 
 
 def edges(tris: np.ndarray) -> np.ndarray:
@@ -35,19 +37,13 @@ def edges(tris: np.ndarray) -> np.ndarray:
     return np.unique(np.sort(tris[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
 
 
-def points_triangles(p: np.ndarray, t: np.ndarray) -> float:
-    """Smallest distance of points, shape (n, 3), and the insides of triangles, shape (m, 3, 3).
-
-    Points that face no inside are at best as near as an edge: of ``segments_segments``.
-    """
+def over(p: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of points, shape (n, 1 or m, 3), over each of m triangles: heights, and who faces it."""
     a, u, v = t[:, 0], t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
-    n = np.cross(u, v)
+    n, d = np.cross(u, v), p - a
     area2 = _dot(n, n)
-    d = p[:, None] - a
     s, r = _dot(np.cross(d, v), n) / area2, _dot(np.cross(u, d), n) / area2
-    facing = (s >= 0.0) & (r >= 0.0) & (s + r <= 1.0)
-    height = np.abs(_dot(d, n)) / np.sqrt(area2)
-    return float(np.min(height[facing], initial=np.inf))
+    return _dot(d, n) / np.sqrt(area2), (s >= 0.0) & (r >= 0.0) & (s + r <= 1.0)
 
 
 def segments_segments(p: np.ndarray, q: np.ndarray) -> float:
@@ -62,20 +58,6 @@ def segments_segments(p: np.ndarray, q: np.ndarray) -> float:
     t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
     s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
     return float(np.linalg.norm(w + s[..., None] * u - t[..., None] * v, axis=-1).min())
-
-
-def crosses(p: np.ndarray, t: np.ndarray) -> bool:
-    """Whether any segment, shape (n, 2, 3), goes through the inside of any triangle."""
-    a, u, v = t[:, 0], t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
-    n = np.cross(u, v)
-    start, way = p[:, None, 0] - a, (p[:, 1] - p[:, 0])[:, None]
-    from_plane, climb = _dot(start, n), _dot(way, n)
-    ends = from_plane * (from_plane + climb) < 0.0
-    s = -from_plane / np.where(ends, climb, 1.0)
-    d = start + s[..., None] * way
-    first, second = _dot(np.cross(d, v), n), _dot(np.cross(u, d), n)
-    area2 = _dot(n, n)
-    return bool((ends & (first > 0.0) & (second > 0.0) & (first + second < area2)).any())
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

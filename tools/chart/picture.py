@@ -2,15 +2,14 @@
 
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
+from matplotlib import rcParams
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import blended_transform_factory as blend
 
 from chart.points import Point, front
 
+rcParams["axes.labelsize"] = 12
 STYLES = {  # method: (colour, marker, what a newcomer is told)
     "default": ("#c8401e", "o", "warp_contact, default"),
     "impulses alone": ("#8a5a9e", "p", "its impulses alone"),
@@ -21,6 +20,7 @@ STYLES = {  # method: (colour, marker, what a newcomer is told)
     "Newton XPBD": ("#5fa8d8", "^", "Newton XPBD"),
     "MuJoCo flex": ("#2f8a4a", "P", "MuJoCo flex"),
 }
+OTHER = "black", "x", "another"
 SUMMARY = {  # panel: its title and what the error is, in the small picture
     "A3": "Hertz pressure\nerror of the pressure in the middle",
     "A7m": "Heavy on light\nerror of the force, of the weight",
@@ -36,14 +36,15 @@ FAINT = 0.25  # opacity of points that their own method beats
 def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
     """A picture of panels in two columns; ``titles``, and what the error is, by their names."""
     rows = -(-len(titles) // 2)
-    figure, axes = plt.subplots(rows, 2, figsize=(14.0, 5.0 * rows), layout="constrained")
+    figure = Figure(figsize=(14.0, 5.0 * rows), layout="constrained")
+    axes = figure.subplots(rows, 2)
     for ax in axes.flat[len(titles) :]:
         ax.set_visible(False)
     for ax, (name, title) in zip(axes.flat, titles.items(), strict=False):
-        panel(ax, title, [p for p in points if p.panel == name and p.shown])
+        panel(ax, title, [p for p in points if p.panel == name])
     handles = []
     for method in dict.fromkeys(p.method for p in points):
-        colour, marker, label = _style(method)
+        colour, marker, label = STYLES.get(method, OTHER)
         handles.append(Line2D([], [], color=colour, marker=marker, ms=9.0, label=label))
     grey = {"color": "0.5", "marker": "o", "ls": ""}
     handles += [
@@ -54,54 +55,38 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
     figure.suptitle(TITLE, fontsize=15)
     figure.legend(handles=handles, loc="outside lower center", ncols=6, fontsize=12, frameon=False)
     figure.savefig(path, dpi=100)
-    plt.close(figure)
 
 
 def panel(ax, title: str, points: list[Point]) -> None:
-    """Points, the front of each method, that of all, and the rail."""
+    """Points, the front of each method, that of all, and each failure on a rail at the top."""
     title, _, error = title.partition("\n")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.set(xscale="log", yscale="log", xlabel="wall seconds per simulated second", ylabel=error)
     ax.set_title(title, fontsize=15, pad=26)
-    ax.set_xlabel("wall seconds per simulated second", fontsize=12)
-    ax.set_ylabel(error, fontsize=12)
-    ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
     ax.tick_params(labelsize=11)
     ax.grid(True, which="major", color="0.9")
-    fine = [p for p in points if not p.failed]
-    floor = FLOOR * min((p.error for p in fine if p.error > 0.0), default=1.0)
-    curve(ax, front(points), floor, color="black", linewidth=6, alpha=0.12)
-    for method in reversed(dict.fromkeys(p.method for p in points)):  # the default lies on top
-        colour, marker, _ = _style(method)
-        mine = [p for p in fine if p.method == method]
-        for alpha, some in ((FAINT, mine), (1.0, front(mine))):
-            style = {"color": colour, "marker": marker, "ls": "", "ms": 7.0, "alpha": alpha}
-            ax.plot([p.wall for p in some], [p.error or floor for p in some], **style)
-        curve(ax, front(mine), floor, color=colour, linewidth=1.8)
-    if any(p.error == 0.0 for p in fine):
+    errors = [p.error for p in points if p.error is not None]
+    floor = FLOOR * min((e for e in errors if e > 0.0), default=1.0)
+    if 0.0 in errors:
         ax.text(1.01, floor, "0", transform=blend(ax.transAxes, ax.transData), va="center")
-    rail(ax, [p for p in points if p.failed])
-
-
-def curve(ax, ahead: list[Point], floor: float, **style) -> None:
-    """The best a method, or all of them, reach within a time."""
-    ax.step([p.wall for p in ahead], [p.error or floor for p in ahead], where="post", **style)
-
-
-def rail(ax, failed: list[Point]) -> None:
-    """Each failure above the panel, at its time or, where it has none, at the right end."""
-    at = blend(ax.transData, ax.transAxes)
-    for p in failed:
-        colour, marker, _ = _style(p.method)
-        x, where = (p.wall, at) if p.wall else (1.0, ax.transAxes)
-        style = {"color": colour, "marker": marker, "mfc": "none", "ms": 7.0}
-        ax.plot([x], [RAIL], transform=where, clip_on=False, **style)
-    if failed:
+    if None in (p.error for p in points):
         ax.plot([0, 1], [RAIL] * 2, color="0.8", transform=ax.transAxes, clip_on=False, zorder=0)
         style = {"transform": ax.transAxes, "fontsize": 10, "ha": "right", "va": "center"}
         ax.text(-0.01, RAIL, "failed", **style)
 
+    def draw_all(draw, some: list[Point], **style) -> None:
+        draw([p.wall for p in some], [p.error or floor for p in some], **style)
 
-def _style(method: str) -> tuple[str, str, str]:
-    return STYLES.get(method, ("black", "x", method))
+    draw_all(ax.step, front(points), where="post", color="black", linewidth=6, alpha=0.12)
+    for method in reversed(dict.fromkeys(p.method for p in points)):  # the default lies on top
+        colour, marker, _ = STYLES.get(method, OTHER)
+        mine = [p for p in points if p.method == method and p.error is not None]
+        dots = {"color": colour, "marker": marker, "ls": "", "ms": 7.0}
+        draw_all(ax.plot, mine, alpha=FAINT, **dots)
+        draw_all(ax.plot, front(mine), **dots)
+        draw_all(ax.step, front(mine), where="post", color=colour, linewidth=1.8)
+        for p in points:
+            if p.method == method and p.error is None:  # at its time, without one at the right end
+                where = blend(ax.transData if p.wall else ax.transAxes, ax.transAxes)
+                ax.plot(p.wall or 1.0, RAIL, transform=where, clip_on=False, mfc="none", **dots)

@@ -1,46 +1,34 @@
-"""The points of the chart: their table, and who of them is ahead."""
+"""The points of the chart: their table, who of them is ahead, and that in words."""
 
 import csv
-from dataclasses import astuple, dataclass
+from operator import attrgetter
 from pathlib import Path
+from typing import NamedTuple
 
-OK = "ok"
-HEAD = "panel", "method", "setting", "wall s per simulated s", "error", "outcome"
-HEAD += "start-up s", "shown"
+HEAD = "panel", "method", "setting", "wall s per simulated s", "error", "outcome", "start-up s"
+BY_WALL, BY_ERROR = attrgetter("wall"), attrgetter("error")
+COMPARED = (  # times of all methods at equal errors, errors at equal times
+    ("error at most {:g}", (0.05, 0.01, 0.001), BY_ERROR, BY_WALL, "{p.method} {p.wall:.3g} s"),
+    ("within {:g} s per s", (1.0, 10.0), BY_WALL, BY_ERROR, "{p.method} {p.error:.2g}"),
+)
 
 
-@dataclass(frozen=True)
-class Point:
-    """A method at one setting in one panel: an error and what it cost, or why there is none.
-
-    A type of its own beside ``measure.figure.Figure``, which has no cost: points are ahead of each
-    other in both, and none is judged by a limit.
-    """
+class Point(NamedTuple):
+    """A method at one setting in one panel: an error and what it cost, or why there is none."""
 
     panel: str
     method: str
     setting: str  # its knobs, as text
     wall: float | None  # seconds per simulated second; None where nothing could be timed
-    error: float | None  # None where the run has none
-    outcome: str = OK  # or the reason why there is no error
+    error: float | None = None  # None where the run has failed
+    outcome: str = "ok"  # or the reason why there is no error
     startup: float | None = None  # seconds up to the end of the first frame: build, compile or load
-    shown: bool = True  # in the pictures; of penalties only the best stiffness is
-
-    @property
-    def failed(self) -> bool:
-        """Whether it belongs on the rail."""
-        return self.outcome != OK
-
-    def cells(self) -> list[str]:
-        """A row of the table, with all digits."""
-        *cells, shown = astuple(self)
-        return [*("" if c is None else str(c) for c in cells), "yes" if shown else "no"]
 
 
 def write(path: Path, points: list[Point]) -> None:
-    """All points."""
+    """All points, with all digits."""
     with open(path, "w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([HEAD, *(point.cells() for point in points)])
+        csv.writer(file).writerows([HEAD, *points])
 
 
 def read(path: Path) -> list[Point]:
@@ -48,27 +36,61 @@ def read(path: Path) -> list[Point]:
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))[1:]
     found = []
-    for *names, wall, error, outcome, startup, shown in rows:
+    for *names, wall, error, outcome, startup in rows:
         wall, error, startup = (float(n) if n else None for n in (wall, error, startup))
-        found.append(Point(*names, wall, error, outcome, startup, shown == "yes"))
+        found.append(Point(*names, wall, error, outcome, startup))
     return found
 
 
 def dominates(a: Point, b: Point) -> bool:
     """Whether ``a`` is no worse in time and error, and better in one; failures dominate nothing."""
-    if a.failed or b.failed:
-        return not a.failed
-    no_worse = a.wall <= b.wall and a.error <= b.error
-    return no_worse and (a.wall < b.wall or a.error < b.error)
+    if a.error is None or b.error is None:
+        return a.error is not None
+    return a.wall <= b.wall and a.error <= b.error and (a.wall, a.error) != (b.wall, b.error)
 
 
 def front(points: list[Point]) -> list[Point]:
     """The points that none dominates, the fastest first; failures are never among them."""
-    kept = [p for p in points if not p.failed and not any(dominates(q, p) for q in points)]
-    return sorted(kept, key=lambda p: p.wall)
+    fine = [p for p in points if p.error is not None]
+    return sorted((p for p in fine if not any(dominates(q, p) for q in fine)), key=BY_WALL)
 
 
-def fastest_below(points: list[Point], error: float) -> Point | None:
-    """The quickest point with at most this error."""
-    fine = [p for p in points if not p.failed and p.error <= error]
-    return min(fine, key=lambda p: p.wall, default=None)
+def report(head: str, titles: dict[str, str], points: list[Point]) -> str:
+    """All panels, after ``head``: machine, versions, date."""
+    parts = [head]
+    for name, title in titles.items():
+        mine = [p for p in points if p.panel == name]
+        parts.append("\n".join([title.replace("\n", ": "), *panel(mine)]))
+    return "\n\n".join(parts) + "\n"
+
+
+def panel(points: list[Point]) -> list[str]:
+    """Who is on the front, behind it, before the default; times at equal error; failures."""
+    of = {p.method: [q for q in points if q.method == p.method] for p in points}
+    fine = {method: [p for p in mine if p.error is not None] for method, mine in of.items()}
+    ahead = front(points)
+    lines = [f"  front: {_show(p)}" for p in ahead] or ["  front: empty, every run failed"]
+    for method, mine in fine.items():
+        if mine and method not in {p.method for p in ahead}:
+            lines.append(f"  behind the front: {_show(min(mine, key=BY_ERROR))} is its best")
+    own = front(of.get("default", []))
+    if own:
+        before = [m for m in of if any(dominates(p, q) for p in of[m] for q in own)]
+        said = ", ".join(before) or "none"
+        lines.append(f"  faster and no less accurate than a point of the default's front: {said}")
+    for head, limits, limited, best, cell in COMPARED:
+        for limit in limits:
+            within = [[p for p in mine if limited(p) <= limit] for mine in fine.values()]
+            first = sorted((min(w, key=best) for w in within if w), key=best)
+            said = ", ".join(cell.format(p=p) for p in first) or "none"
+            lines.append(f"  {head.format(limit)}: {said}")
+    for method, mine in of.items():
+        why = [p.outcome for p in mine if p.error is None]
+        if why:
+            said = "; ".join(dict.fromkeys(why))
+            lines.append(f"  failed: {method}, {len(why)} of {len(mine)}: {said}")
+    return lines
+
+
+def _show(p: Point) -> str:
+    return f"{p.method} ({p.setting}), {p.wall:.3g} s per s, error {p.error:.2g}"

@@ -10,67 +10,62 @@ predicted forces come within 0.3 to 1.2 % of an edge of it. An engine with anoth
 moves otherwise by the difference of the laws, which no part of this figure takes out.
 """
 
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
-import warp as wp
 from engines import ours
-from engines.settings import DEFAULT
-from engines.task import Failed, Motion, Numbered, Task
+from engines.task import Failed, Motion, Task
 from verification.scenes import in_edges
 from verification.setup import mean_edge
 
 import warp_contact as wc
 from chart.distance import distance
-from chart.panel import TUNNELLED, Panel, late, sound
+from chart.panel import Panel, late, sound
 from warp_contact import scenes
 
 FPS = 60
 DURATION, QUICK = 1.0, 0.5  # [s]
 CONVERGED = 16  # times the steps
 LATE = 0.25  # part of the frames at the end in which the bodies of a pair touch
+TUNNELLED = 1.0  # of an edge: an overlap or gap from which a body is on the wrong side
 TITLES = {
     "squeezed_sphere": "squeezed sphere",
     "cubes_on_membrane": "cubes on a membrane 1:4:16",
 }
-PRESSED = {  # bodies that are squeezed together, or rest on each other, by their labels
-    "squeezed_sphere": (("lower_cube", "sphere"), ("sphere", "upper_cube")),
-    "cubes_on_membrane": tuple(("membrane", f"cube_{mass}") for mass in (1, 4, 16)),
-}
+# Bodies that are squeezed together, or rest on each other, by their labels.
+PRESSED = [("lower_cube", "sphere"), ("sphere", "upper_cube")]
+PRESSED += [("membrane", f"cube_{mass}") for mass in (1, 4, 16)]
 
 
 def scene(name: str, quick: bool) -> tuple[Task, list[Panel]]:
     """A scene of the paper: overlap and gap, its overlap alone, its motion."""
-    module = scenes.load(name)
+    module, title = scenes.load(name), TITLES[name] + "\n{} [of an edge]"
     frames = round((QUICK if quick else DURATION) * FPS)
-    errors = {
-        "": ("overlap or gap", apart),
-        " overlap": ("overlap alone", inside),
-        " motion": ("distance from a converged run", astray),
-    }
-    panels = [
-        Panel(name + end, f"{TITLES[name]}\n{title} [of an edge]", partial(error, PRESSED[name]))
-        for end, (title, error) in errors.items()
+    return Task(module.build, FPS, frames, **module.PENALTY), [
+        Panel(name, title.format("overlap or gap"), apart),
+        Panel(f"{name} overlap", title.format("overlap alone"), inside),
+        Panel(f"{name} motion", title.format("distance from a converged run"), astray),
     ]
-    return Task(module.build, FPS, frames, **module.PENALTY), panels
 
 
-def apart(pressed: tuple, task: Task, motion: Motion) -> float:
+def apart(task: Task, motion: Motion) -> float:
     """The larger of the deepest overlap and the gap."""
-    return max(deepest(task, motion), gap(pressed, task, motion))
+    return max(inside(task, motion), gap(task, motion))
 
 
-def inside(pressed: tuple, task: Task, motion: Motion) -> float:
-    """The deepest overlap, of bodies that are still where they can have one."""
-    worst = deepest(task, motion)
-    gap(pressed, task, motion)
+def inside(task: Task, motion: Motion) -> float:
+    """Deepest overlap after any frame, in edges of the finer body of the two."""
+    sound(task, motion)
+    worst = max(overlap for overlap, _ in overlaps(task, motion))
+    if worst >= TUNNELLED:
+        raise Failed(f"bodies inside each other ({worst:.2g} edges)")
+    gap(task, motion)  # bodies that went through each other have no overlap any more
     return worst
 
 
-def astray(pressed: tuple, task: Task, motion: Motion) -> float:
+def astray(task: Task, motion: Motion) -> float:
     """Root mean square distance from the converged motion, in mean edges of the scene."""
-    sound(task, motion)
-    gap(pressed, task, motion)
+    gap(task, motion)
     return rms_distance(task, motion.x, converged(task))
 
 
@@ -83,17 +78,8 @@ def rms_distance(task: Task, one: np.ndarray, other: np.ndarray) -> float:
 @cache
 def converged(task: Task, times: int = CONVERGED) -> np.ndarray:
     """Positions of the default at so many times the steps [m], shape (frames + 1, n, 3)."""
-    steps = ours.run(task, DEFAULT, None, np.inf).steps
-    return ours.run(task, DEFAULT, times * steps, np.inf).x
-
-
-def deepest(task: Task, motion: Motion) -> float:
-    """Deepest overlap after any frame, in edges of the finer body of the two."""
-    sound(task, motion)
-    worst = max(overlap for overlap, _ in overlaps(task, motion))
-    if worst >= TUNNELLED:
-        raise Failed(f"bodies inside each other ({worst:.2g} edges)")
-    return worst
+    steps = ours.run(task, ours.DEFAULT, None, np.inf).steps
+    return ours.run(task, ours.DEFAULT, times * steps, np.inf).x
 
 
 def overlaps(task: Task, motion: Motion):
@@ -101,22 +87,20 @@ def overlaps(task: Task, motion: Motion):
     sim = wc.Simulation(task.scene(), fps=task.fps)
     for x in motion.x:
         sim.state.x.assign(np.ascontiguousarray(x, dtype=np.float32))
-        with wp.ScopedDevice(sim.device):
-            measured = sim.measure()
-            yield in_edges(sim, measured), measured
+        measured = sim.measure()
+        yield in_edges(sim, measured), measured
 
 
-def gap(pressed: tuple, task: Task, motion: Motion) -> float:
-    """Distance of the worst of the ``pressed`` pairs, in edges of its finer body.
+def gap(task: Task, motion: Motion) -> float:
+    """Distance of the worst of the ``PRESSED`` pairs, in edges of its finer body.
 
-    The median of the last frames: a hop between two impacts is no gap, one that stays is. Bodies
-    that went through each other have no overlap any more, but end further apart than an edge.
+    The median of the last frames: a hop between two impacts is no gap, one that stays is.
     """
-    scene = task.scene()
-    parts = zip(scene.bodies, Numbered(scene).parts, strict=True)
+    parts = zip(task.scene().bodies, sound(task, motion).parts, strict=True)
     found = {body.label: (body.mesh, part) for body, part in parts}
     worst = 0.0
-    for (one, here), (two, there) in (map(found.get, pair) for pair in pressed):
+    pairs = (pair for pair in PRESSED if found.keys() >= {*pair})
+    for (one, here), (two, there) in (map(found.get, pair) for pair in pairs):
         frames = motion.x[late(task, LATE)]
         d = [distance(x[here], one.surface, x[there], two.surface) for x in frames]
         worst = max(worst, float(np.median(d)) / min(mean_edge(one), mean_edge(two)))

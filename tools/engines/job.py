@@ -1,84 +1,59 @@
-"""The loop over the frames, the same for every engine, and its process. NumPy only.
+"""The loop over the frames, the same for every engine, and the process of one outside. NumPy only.
 
-An engine is an object with ``step_frame()``, ``state()`` -> (x, v), ``halt()`` for driven vertices,
-and ``steps`` of a frame. The adapter of an engine outside is a file with
-``make(scene, job, setting)`` that returns one and raises ``CannotDo`` where the engine cannot
-represent the scene. It calls ``main(make)``.
+An engine has those parts of a ``Simulation`` that ``play`` uses, and ``halt()`` for held vertices.
+The adapter of an engine outside is a file that calls ``main(make)`` with what makes one of a scene
+(``runs.plain``) and a setting, or raises NotImplementedError where it cannot represent the scene.
 """
 
-import json
+import os
+import pickle
 import sys
 from functools import partial
-from pathlib import Path
 from time import perf_counter
-from types import SimpleNamespace
 
 import numpy as np
 
 
-class CannotDo(Exception):
-    """The engine cannot represent the scene; the message says why."""
-
-
 def main(make) -> None:
-    """Run every setting of the job in the folder that the command line names."""
-    folder = Path(sys.argv[1])
-    job = json.loads((folder / "job.json").read_text(encoding="utf-8"))
-    with np.load(folder / "scene.npz") as arrays:
-        scene = SimpleNamespace(**arrays)
-    for k, setting in enumerate(job["settings"]):
-        try:
-            result = play(partial(make, scene, job, setting), **job["run"])
-        except CannotDo as error:
-            result = {"reason": f"cannot represent the scene: {error}"}
-        except Exception as error:
-            result = {"reason": f"{type(error).__name__}: {error}".splitlines()[0]}
-        result |= {name: result[name].astype(float) for name in ("x", "v") if name in result}
-        part = folder / f"part{k}.npz"
-        np.savez(part, **{"reason": "", **result})
-        part.rename(folder / f"result{k}.npz")
+    """Run every setting of the job that comes in, write each result as it is there."""
+    scene, run, settings = pickle.load(sys.stdin.buffer)
+    with open(os.dup(1), "wb") as out:
+        os.dup2(2, 1)  # what engines print is no result
+        for setting in settings:
+            try:
+                result = play(partial(make, scene, setting), *run)
+            except NotImplementedError as error:
+                result = {"reason": f"cannot represent the scene: {error}"}
+            except Exception as error:
+                result = {"reason": f"{type(error).__name__}: {error}".splitlines()[0]}
+            pickle.dump(result, out)
+            out.flush()
 
 
 def play(make, fps: float, frames: int, stop: int | None, limit: float) -> dict:
-    """Step all frames; the first one, which compiles and captures, is not timed.
+    """The fields of a ``Motion`` but its law, of what ``make()`` returns.
 
-    Args:
-        make: returns the engine
-        fps: frames per second
-        frames: how many
-        stop: frame after which driven vertices stand still
-        limit: wall seconds after which the run is given up
-
-    Returns:
-        the fields of a ``Motion`` but its law; or ``reason`` and ``wall`` of a failure
+    The first frame, which compiles and captures, is not timed. Held vertices stand still after the
+    frame ``stop``; the run is given up after ``limit`` wall seconds.
     """
     begin = perf_counter()
     engine = make()
-    states = [engine.state()]
-    startup = wall = 0.0
+    states = [(engine.positions(), engine.velocities())]
+    wall = 0.0
     for frame in range(1, frames + 1):
         if frame - 1 == stop:
             engine.halt()
         start = perf_counter()
         engine.step_frame()
+        wall += perf_counter() - start
         if frame == 1:
-            startup = perf_counter() - begin
-        else:
-            wall += perf_counter() - start
-        states.append(engine.state())
+            startup, wall = perf_counter() - begin, 0.0
+        states.append((engine.positions(), engine.velocities()))
         rate = wall * fps / max(frame - 1, 1)
         if not np.isfinite(states[-1][0]).all():
-            return {"reason": f"not finite after frame {frame}", "wall": rate}
+            return {"reason": f"not finite after frame {frame}", "wall": rate or None}
         if wall > limit and frame < frames:
             reason = f"too slow: {frame} of {frames} frames in {limit:.3g} s"
             return {"reason": reason, "wall": rate}
     x, v = map(np.array, zip(*states, strict=True))
-    return {"x": x, "v": v, "wall": rate, "startup": startup, "steps": engine.steps}
-
-
-def mean_edge(scene: SimpleNamespace) -> float:
-    """Mean edge of the surface triangles of the finest body [m]."""
-    a, b = scene.rest[scene.surface], scene.rest[np.roll(scene.surface, 1, axis=1)]
-    length = np.linalg.norm(a - b, axis=2).mean(axis=1)
-    owner = scene.body[scene.surface[:, 0]]
-    return min(float(length[owner == k].mean()) for k in np.unique(owner))
+    return {"x": x, "v": v, "wall": rate, "startup": startup, "steps": engine.substeps}

@@ -23,7 +23,7 @@ import sys
 import newton
 import numpy as np
 import warp as wp
-from job import CannotDo, main, mean_edge
+from job import main
 
 wp.config.log_level = wp.LOG_WARNING
 
@@ -37,109 +37,98 @@ def drive(v: wp.array[wp.vec3], dt: float, q: wp.array[wp.vec3]):
     q[i] = q[i] + dt * v[i]
 
 
-def vbd(scene, job: dict, setting: dict) -> "Engine":
+def vbd(scene, setting: dict) -> "Engine":
     """The engine with vertex block descent."""
-    edge = mean_edge(scene)
-    margin = setting["margin"] * edge
-    model = build(scene, job["friction"], 0.5, setting["contact"], POINT * edge)
+    model = build(scene, 0.5, setting["contact"], POINT * scene.edge)
     solver = newton.solvers.SolverVBD(
         model,
         iterations=setting["iterations"],
-        particle_enable_self_contact=len(scene.young) > 1,
-        particle_self_contact_margin=margin,
-        particle_self_contact_gap=margin,
+        particle_enable_self_contact=len(scene.bodies) > 1,
+        particle_self_contact_margin=setting["margin"] * scene.edge,
+        particle_self_contact_gap=setting["margin"] * scene.edge,
         particle_enable_tile_solve=False,
     )
-    return Engine(scene, job, setting, model, solver)
+    return Engine(scene, setting, model, solver)
 
 
-def xpbd(scene, job: dict, setting: dict) -> "Engine":
+def xpbd(scene, setting: dict) -> "Engine":
     """The engine with extended position-based dynamics."""
-    if scene.lame[:, 1].min() <= 0.0:
-        raise CannotDo("its tets have no forces where the second Lame parameter is zero")
-    radius = (POINT if len(scene.young) == 1 else setting["radius"]) * mean_edge(scene)
-    model = build(scene, job["friction"], 1.0, 1.0, radius)
-    solver = newton.solvers.SolverXPBD(
-        model,
-        iterations=setting["iterations"],
-        soft_body_relaxation=setting["relaxation"],
-        soft_contact_relaxation=setting["relaxation"],
-    )
-    return Engine(scene, job, setting, model, solver)
+    if min(body.lame[1] for body in scene.bodies) <= 0.0:
+        raise NotImplementedError("its tets have no forces where the second Lame parameter is zero")
+    radius = (POINT if len(scene.bodies) == 1 else setting["radius"]) * scene.edge
+    model = build(scene, 1.0, 1.0, radius)
+    relaxation = {f"soft_{part}_relaxation": setting["relaxation"] for part in ("body", "contact")}
+    solver = newton.solvers.SolverXPBD(model, iterations=setting["iterations"], **relaxation)
+    return Engine(scene, setting, model, solver)
 
 
-def build(scene, friction: float, damping: float, contact: float, radius: float) -> newton.Model:
+def build(scene, damping: float, contact: float, radius: float) -> newton.Model:
     """A coloured model with the masses of the scene; a mass of zero holds a particle.
 
-    Args:
-        scene: arrays of a job
-        friction: of planes and particles [-]; the solvers mix both
-        damping: coefficient of a tet, over beta mu [-]
-        contact: stiffness over the smallest modulus and an edge of the finest body [-]
-        radius: of the particles [m]
+    The damping of a tet is over beta mu, the stiffness of contact over the smallest modulus and an
+    edge of the finest body; the radius [m] is that of the particles.
     """
-    builder = newton.ModelBuilder(gravity=tuple(scene.gravity.tolist()))
-    for k in range(len(scene.young)):
-        mine = scene.body == k
-        first = int(np.flatnonzero(mine)[0])
-        mu, lam = scene.lame[k].tolist()
+    builder = newton.ModelBuilder(gravity=scene.gravity)
+    place = {"pos": wp.vec3(), "rot": wp.quat_identity(), "scale": 1.0, "vel": wp.vec3()}
+    for body, part in zip(scene.bodies, scene.parts, strict=True):
+        mu, lam = body.lame
         builder.add_soft_mesh(
-            pos=wp.vec3(),
-            rot=wp.quat_identity(),
-            scale=1.0,
-            vel=wp.vec3(),
-            vertices=[wp.vec3(*p) for p in scene.rest[mine].tolist()],
-            indices=(scene.tets[scene.tet_body == k] - first).ravel().tolist(),
-            density=float(scene.density[k]),
+            vertices=[wp.vec3(*p) for p in scene.rest[part].tolist()],
+            indices=body.tets.ravel().tolist(),
+            density=body.density,
             k_mu=mu,
             k_lambda=lam,
-            k_damp=damping * float(scene.damping[k]) * mu,
+            k_damp=damping * body.damping * mu,
             particle_radius=radius,
+            **place,
         )
     builder.particle_mass = np.where(scene.fixed, 0.0, scene.mass).tolist()
-    stiffness = contact * float(scene.young.min()) * mean_edge(scene)
-    config = newton.ModelBuilder.ShapeConfig(ke=stiffness, kd=0.0, mu=friction)
-    for *n, h in scene.planes.tolist():
+    stiffness = contact * min(body.youngs_modulus for body in scene.bodies) * scene.edge
+    config = newton.ModelBuilder.ShapeConfig(ke=stiffness, kd=0.0, mu=scene.friction)
+    for n, h in scene.planes:
         builder.add_shape_plane(plane=(*n, -h), width=0.0, length=0.0, cfg=config)
     builder.color()
     model = builder.finalize(device="cpu")
     model.soft_contact_ke, model.soft_contact_kd = stiffness, 0.0
-    model.soft_contact_mu = model.particle_mu = friction
+    # The solvers mix that of planes and that of particles.
+    model.soft_contact_mu = model.particle_mu = scene.friction
     return model
 
 
 class Engine:
     """Steps a model with a solver, frame by frame as a captured graph."""
 
-    def __init__(self, scene, job: dict, setting: dict, model: newton.Model, solver):
+    def __init__(self, scene, setting: dict, model: newton.Model, solver):
         """Lay out the states; ``solver`` steps from the one to the other."""
         self.model, self.solver = model, solver
-        self.steps = setting["steps"]
-        self.dt = 1.0 / (job["fps"] * self.steps)
+        self.substeps = setting["steps"]
+        self.dt = 1.0 / (scene.fps * self.substeps)
         self.now, self.then = model.state(), model.state()
         held = np.where(scene.fixed[:, None], scene.v, 0.0).astype(np.float32)
         for state in (self.now, self.then):
             state.particle_q.assign(scene.x.astype(np.float32))
             state.particle_qd.assign((scene.v - held).astype(np.float32))
         self.held = wp.array(held, dtype=wp.vec3, device="cpu")
-        self.control = model.control()
-        self.pipeline = newton.CollisionPipeline(model)
-        self.contacts = self.pipeline.contacts()
-        self.graph = None
+        self.control, self.pipeline = model.control(), newton.CollisionPipeline(model)
+        self.contacts, self.graph = self.pipeline.contacts(), None
 
     def step_frame(self) -> None:
         """One frame; the first is stepped as it is and captured for the others."""
-        if self.graph is None:
-            self._steps()
-            with wp.ScopedCapture(device="cpu") as capture:
-                self._steps()
-            self.graph = capture.graph
-        else:
+        if self.graph is not None:
             wp.capture_launch(self.graph)
+            return
+        self._steps()
+        with wp.ScopedCapture(device="cpu") as capture:
+            self._steps()
+        self.graph = capture.graph
 
-    def state(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s]."""
-        return self.now.particle_q.numpy().copy(), self.now.particle_qd.numpy().copy()
+    def positions(self) -> np.ndarray:
+        """Of all particles [m]."""
+        return self.now.particle_q.numpy().astype(float)
+
+    def velocities(self) -> np.ndarray:
+        """Of all particles [m/s]."""
+        return self.now.particle_qd.numpy().astype(float)
 
     def halt(self) -> None:
         """Held particles stand still from now on."""
@@ -147,7 +136,7 @@ class Engine:
 
     def _steps(self) -> None:
         a, b = self.now, self.then
-        for _ in range(self.steps):
+        for _ in range(self.substeps):
             a.clear_forces()
             inputs = [self.held, self.dt]
             wp.launch(drive, dim=self.model.particle_count, inputs=inputs, outputs=[a.particle_q])
@@ -160,4 +149,4 @@ class Engine:
 
 
 if __name__ == "__main__":
-    main({"vbd": vbd, "xpbd": xpbd}[sys.argv[2]])
+    main({"Newton VBD": vbd, "Newton XPBD": xpbd}[sys.argv[1]])

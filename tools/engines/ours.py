@@ -1,65 +1,80 @@
-"""Run a task with a response of this package."""
+"""The methods of this package with their knobs, and how each runs a task."""
 
-from contextlib import ExitStack
-from functools import partial
+from contextlib import nullcontext
+from typing import NamedTuple
 
 import numpy as np
 
 import warp_contact as wc
 from engines.job import play
-from engines.settings import Own
-from engines.task import Failed, Motion, Task
+from engines.task import Motion, Task
 from warp_contact.data.switches import without
 
 
-class Engine:
-    """A simulation, on the CPU as in other engines."""
+class Own(NamedTuple):
+    """A method at one setting."""
 
-    def __init__(self, task: Task, response, substeps: int | None):
-        """Put the bodies where they start."""
-        scene = task.scene()
-        self.sim = wc.Simulation(scene, response, task.fps, substeps, device="cpu")
-        self.sim.state.x.assign(task.placed(scene).astype(np.float32))
+    method: str
+    iterations: int = 0  # of the search of a contact surface; 0 where none is swept
+    times: float = 0.0  # stiffness of a penalty over that of the task; 0 for other responses
+    factor: int = 1  # substeps over those that the simulation takes by itself; 1 leaves it to it
 
-    def step_frame(self) -> None:
-        """One frame."""
-        self.sim.step_frame()
+    def __str__(self):
+        """The knobs."""
+        knob = f"stiffness x{self.times:g}, " if self.times else ""
+        knob += f"iterations {self.iterations}, " if self.iterations else ""
+        return f"{knob}steps x{self.factor}"
 
-    def state(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s]."""
-        return self.sim.positions(), self.sim.velocities()
+    def response(self, task: Task):
+        """For a task; the damping of a penalty keeps its ratio."""
+        if self.method == "penalty":
+            return wc.Penalty(self.times * task.stiffness, self.times**0.5 * task.damping)
+        if self.method == "predicted":
+            return wc.PredictedForce()
+        search = "literal" if self.method == "literal" else "balanced"
+        return wc.ContactSurface(search, self.iterations or DEFAULT.iterations)
+
+
+DEFAULT = Own("default", 4)
+STIFFNESSES = 0.01, 0.1, 1.0, 10.0, 100.0  # of that of the task
+QUICK = [
+    *(DEFAULT._replace(factor=f) for f in (1, 2, 4)),
+    *(Own("default", n) for n in (2, 8)),
+    *(Own(name, factor=f) for name in ("impulses alone", "predicted") for f in (1, 2, 4)),
+    *(Own("literal", n) for n in (4, 8, 16)),
+    *(Own("penalty", times=k) for k in STIFFNESSES),
+]
+ALL = [
+    *QUICK,
+    *(Own("default", n, factor=f) for n in (2, 8, 16) for f in (2, 4)),
+    *(Own("literal", n, factor=f) for n in (4, 8, 16) for f in (2, 4)),
+    *(Own("penalty", times=k, factor=2) for k in STIFFNESSES),
+]
+
+
+class Engine(wc.Simulation):
+    """A simulation whose held vertices can be stopped."""
 
     def halt(self) -> None:
         """Held vertices stand still from now on."""
-        for body in self.sim.scene.bodies:
+        for body in self.scene.bodies:
             if body.fixed.any():
-                self.sim.set_velocity(body, (0.0, 0.0, 0.0), body.fixed)
-
-    @property
-    def steps(self) -> int:
-        """Of the last frame."""
-        return self.sim.substeps
+                self.set_velocity(body, (0.0, 0.0, 0.0), body.fixed)
 
 
 def run(task: Task, setting: Own, substeps: int | None, limit: float) -> Motion:
-    """The motion in a task.
+    """The motion in a task; without ``substeps`` their number is left to the simulation."""
 
-    Without surfaces the last stage of a step is left out. It is no option of the package.
+    def make() -> Engine:
+        response = setting.response(task)
+        sim = Engine(task.scene(), response, task.fps, substeps, device="cpu")
+        sim.state.x.assign(task.start(sim.scene).astype(np.float32))
+        return sim
 
-    Args:
-        task: what to run
-        setting: with what
-        substeps: in each frame; None leaves the number to the simulation
-        limit: wall seconds after which the run is given up
-    """
-    make = partial(Engine, task, setting.response(task), substeps)
-    with ExitStack() as still:
-        for part in () if setting.surfaces else ("search", "closure"):
-            still.enter_context(without(part))
+    # To leave out the stage that moves surfaces is no option of the package.
+    leave_out = without if setting.method == "impulses alone" else nullcontext
+    with leave_out("search"), leave_out("closure"):
         try:
-            found = play(make, task.fps, task.frames, task.stop, limit)
+            return Motion(**play(make, task.fps, task.frames, task.stop, limit))
         except wc.SimulationError as error:
-            raise Failed(str(error)) from None
-    if "reason" in found:
-        raise Failed(**found)
-    return Motion(law="neo-hookean", **found)
+            return Motion(reason=str(error))

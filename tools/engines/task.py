@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,24 +11,24 @@ import warp_contact as wc
 
 
 class Failed(Exception):
-    """A run that has no error to show; the message is the reason."""
-
-    def __init__(self, reason: str, wall: float | None = None):
-        """``wall``: seconds per simulated second, where something could be timed."""
-        super().__init__(reason)
-        self.wall = wall
+    """A motion that has no error to show; the message is the reason."""
 
 
-@dataclass
-class Motion:
-    """One run, as positions and velocities after each frame."""
+class Motion(NamedTuple):
+    """One run, as positions and velocities after each frame, or the reason why there is none."""
 
-    x: np.ndarray  # (frames + 1, n, 3) [m], the start included
-    v: np.ndarray  # the same [m/s]
-    law: str  # of elasticity, by which the engine is judged
-    wall: float  # seconds per simulated second; contact detection inside, start-up outside
-    startup: float  # seconds up to the end of the first frame: build, compile or load kernels
-    steps: int  # of the last frame
+    x: np.ndarray | None = None  # (frames + 1, n, 3) [m], the start included
+    v: np.ndarray | None = None  # the same [m/s]
+    law: str = "neo-hookean"  # of elasticity, by which the engine is judged
+    wall: float | None = None  # seconds per simulated second, with detection; None if never timed
+    startup: float | None = None  # seconds up to the end of the first frame: build, compile or load
+    steps: int = 0  # of the last frame
+    reason: str = ""
+
+
+def placed(scene: wc.Scene) -> np.ndarray:
+    """All vertices of the rest shapes as placed [m], shape (n, 3)."""
+    return np.concatenate([body.x for body in scene.bodies])
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,8 @@ class Task:
     frames: int
     stiffness: float = 1.0  # of a penalty about which it is swept [N/m]
     damping: float = 0.0  # of that penalty [N s/m]
-    # Positions at the start [m] where these are not the rest shapes as placed.
-    start: Callable[[wc.Scene], np.ndarray] | None = None
+    start: Callable[[wc.Scene], np.ndarray] = placed  # positions at the start [m]
     stop: int | None = None  # frame after which held vertices stand still
-
-    def placed(self, scene: wc.Scene) -> np.ndarray:
-        """Positions of all vertices at the start [m]."""
-        return Numbered(scene).rest if self.start is None else self.start(scene)
 
 
 class Numbered:
@@ -55,13 +51,9 @@ class Numbered:
         bodies = scene.bodies
         starts = np.cumsum([0, *(len(b.x) for b in bodies)]).tolist()
         self.parts = [slice(*ends) for ends in pairwise(starts)]  # vertices of each body
-        self.rest = np.concatenate([b.x for b in bodies])  # (n, 3) [m], as placed
-        self.mass = np.concatenate([_masses(b) for b in bodies])  # (n,) [kg], a quarter of each tet
+        self.rest = placed(scene)
+        self.v = np.concatenate([b.v for b in bodies])  # (n, 3) [m/s], at the start
+        self.fixed = np.concatenate([b.fixed for b in bodies])
         self.tets = np.concatenate([b.mesh.tets + k for b, k in zip(bodies, starts, strict=False)])
-        lame = [np.tile(b.material.lame(), (len(b.mesh.tets), 1)) for b in bodies]
-        self.lame = np.concatenate(lame)  # (m, 2) [Pa]: mu, lam
-
-
-def _masses(body) -> np.ndarray:
-    share = np.repeat(0.25 * body.material.density * body.mesh.volumes, 4)
-    return np.bincount(body.mesh.tets.ravel(), share, minlength=len(body.x))
+        share = [np.repeat(0.25 * b.material.density * b.mesh.volumes, 4) for b in bodies]
+        self.mass = np.bincount(self.tets.ravel(), np.concatenate(share))  # (n,) [kg]

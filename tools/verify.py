@@ -1,6 +1,6 @@
 """Measure the simulator against closed forms and targets, and print one table.
 
-    python tools/verify.py [case ...] [--quick] [--response NAME] [--seed N]
+    python tools/verify.py [case ...] [--quick]
 
 A figure with a closed form is an error against an exact value and reaches a level: good, excellent,
 best; one with a target is ok within it. A case holds what all of its figures hold. The exit status
@@ -14,7 +14,6 @@ from pkgutil import resolve_name
 from measure import machine, report
 from measure.figure import lowest
 from measure.run import command_line, one_of, run, status
-from verification.setup import RESPONSES, Ask
 
 CASES = {  # title, where the figures come from
     "springs": ("A1 series springs", "springs.run"),
@@ -42,15 +41,11 @@ def main() -> int:
     names = f"of {', '.join(CASES)}; or all"
     parser.add_argument("cases", nargs="*", metavar="case", type=one_of(CASES), help=names)
     parser.add_argument("--quick", action="store_true", help="fewer variants, coarser meshes")
-    parser.add_argument("--response", choices=RESPONSES, default="default")
-    parser.add_argument("--seed", type=int, default=0, help="of the jittered meshes")
     args = parser.parse_args()
-    print(machine.line(), f"response {args.response}, SEED={args.seed}", "", sep="\n")
-    print(report.FIGURES.head())
-    ask = Ask(args.quick, args.response, args.seed)
+    print(machine.line(), "", report.FIGURES.head(), sep="\n")
     chosen = [CASES[name] for name in args.cases or CASES]
     cases = {title: resolve_name(f"verification.{where}") for title, where in chosen}
-    found = run({title: partial(case, ask) for title, case in cases.items()})
+    found = run({title: partial(case, args.quick) for title, case in cases.items()})
     print("", *(f"{title}: {lowest(kept)}" for title, kept in found.items()), sep="\n")
     return status(found)
 

@@ -10,7 +10,7 @@ from unittest import mock
 import numpy as np
 import warp as wp
 from verification import collision, surface, weight
-from verification.setup import Ask, on_face
+from verification.setup import on_face
 
 import warp_contact as wc
 from trials import figures, limits, loads, sweeps
@@ -132,7 +132,7 @@ def sheet() -> float:
         mock.patch.object(impulse, "_sweep", counting(impulse._sweep, sweeps)),
         mock.patch.object(impulse, "add_forces", counting(impulse.add_forces, steps)),
     ):
-        list(weight.on_sheet("", Ask()))
+        list(weight.on_sheet(""))
     return float(sweeps.numpy()[0] / steps.numpy()[0])
 
 

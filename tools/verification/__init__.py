@@ -1,1 +1,1 @@
-"""The cases of ``tools/verify.py``: functions that take what is asked and yield figures."""
+"""The cases of ``tools/verify.py``: functions that yield figures; quick ones, fewer variants."""

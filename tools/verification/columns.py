@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 import warp_contact as wc
-from verification.relax import step_rate
-from verification.setup import ALIGNED, Ask, Pose, block, forces, gradients, on_face
+from verification.setup import ALIGNED, Pose, block, forces, gradients, on_face, step_rate
 from warp_contact.scene.scene import Body
 
 
@@ -67,18 +66,15 @@ class Pile(NamedTuple):
             foot += c.length + self.gap
         return scene
 
-    def simulate(self, ask: Ask, load: float | None = None) -> wc.Simulation:
-        """A simulation in frames of about one step; a penalty has 100 E A / L in all.
+    def simulate(self, load: float | None = None) -> wc.Simulation:
+        """A simulation in frames of about one step.
 
         It starts at rest under the weights and a pressure ``load`` [Pa] on top, neighbours touching
         or with a gap above zero; or in the rest shapes.
         """
-        first, height = self.columns[0], sum(c.length for c in self.columns)
-        contacts = sum((c.cells[0] + 1) * (c.cells[1] + 1) for c in self.columns[:2])
-        stiffness = 100.0 * first.young * first.section[0] * first.section[1] / height / contacts
         edge = min(min(c.section[0] / c.cells[0], c.length / c.cells[2]) for c in self.columns)
         rate = step_rate(edge, max(c.wave_speed for c in self.columns))
-        sim = wc.Simulation(self.build(), ask.respond(stiffness), fps=rate)
+        sim = wc.Simulation(self.build(), fps=rate)
         if load is not None:
             x = np.concatenate(self.static(sim.scene, load))
             sim.state.x.assign(x.astype(np.float32))

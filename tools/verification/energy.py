@@ -10,7 +10,7 @@ import warp as wp
 from measure.figure import Figure, Figures, zero
 
 import warp_contact as wc
-from verification.setup import Ask, masses, on_face, watch
+from verification.setup import masses, on_face, watch
 from warp_contact.step import forces
 
 SIZE, CELLS = (0.4, 0.1, 0.1), (8, 2, 2)  # [m], held at one end
@@ -27,9 +27,9 @@ MATERIALS = {
 NONE, OFF = (1e-3,), (5.0,)  # largest decrement without damping; % off with it
 
 
-def run(ask: Ask) -> Figures:
+def run(quick: bool) -> Figures:
     """Every material and damping; the quick run leaves two materials out."""
-    for name, ratio in product(list(MATERIALS)[: 1 if ask.quick else None], RATIOS):
+    for name, ratio in product(list(MATERIALS)[: 1 if quick else None], RATIOS):
         yield decay(f"energy {name} damping ratio {ratio:g}", MATERIALS[name], ratio)
 
 

@@ -7,10 +7,10 @@ from facet to facet. The coarse block is flat and fixed, so that the answer is e
 and then the height depends on where the load is and is not judged.
 
 What makes the force continuous are the weights of eqs. (1) and (2) and of the impulses: the
-barycentric ones of a contact point in its triangle. They are switched off in turn on the deformable
-block, where they matter: on a flat rigid one any weights give the same. All is then on the closest
-vertex, or the same on each, right after contacts were found. These figures are shown, next to the
-same with the weights as reference, and have no limits.
+barycentric ones of a contact point in its triangle. They are switched off on the deformable block,
+where they matter: on a flat rigid one any weights give the same. All is then on the closest vertex,
+right after contacts were found. These figures are shown, next to the same with the weights as
+reference, and have no limits.
 """
 
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ import warp as wp
 from measure.figure import Figure, Figures, relative, rms, zero
 
 import warp_contact as wc
-from verification.setup import Ask, G, forces, masses, watch
+from verification.setup import G, forces, masses, watch
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.measure.contact_fields import vertex_area
 from warp_contact.step import narrow_phase
@@ -36,23 +36,20 @@ LENGTH, WIDTH = 0.4, 0.2  # of the coarse block, about [m]
 SPEED = 0.1  # [m/s]
 SETTLE, SAMPLE = 0.8, 1.2  # [s]: the slow cell of ratio 4 lasts 1 s
 FPS = 60
-PENALTY = 500.0, 1.0  # [N/m], [N s/m]
-
-CLOSEST, EQUAL = "closest vertex", "plain mean"  # in place of the weights
 
 NORMAL, ALONG = (0.1, 0.02, 0.001), (0.05, 0.01, 0.001)  # rms of the force, of W
 HEIGHT = 1e-3, 1e-4, 1e-5  # rms, of an edge
 
 
-def run(ask: Ask) -> Figures:
+def run(quick: bool) -> Figures:
     """Both ratios on a fixed block; with and without weights on a deformable one, quick for one."""
     for ratio in RATIOS:
-        yield from drag(ask, ratio, fixed=True)
-    for ratio in RATIOS[: 1 if ask.quick else None]:
-        yield from compare(ask, ratio)
+        yield from drag(ratio, fixed=True)
+    for ratio in RATIOS[: 1 if quick else None]:
+        yield from compare(ratio)
 
 
-def drag(ask: Ask, ratio: float, fixed: bool) -> Figures:
+def drag(ratio: float, fixed: bool) -> Figures:
     """A fine block in motion on a coarse one: what is felt after it settled."""
     scene = wc.Scene(gravity=(0.0, 0.0, -G), friction=0.0)
     cell = ratio * EDGE / CELLS
@@ -65,7 +62,7 @@ def drag(ask: Ask, ratio: float, fixed: bool) -> Figures:
     high = 0.5 * EDGE + 1e-3 * EDGE / CELLS
     place = 0.5 * (EDGE - size[0]) + 0.013, 0.007, high  # rims over no edge
     scene.add_body(wc.box(EDGE, CELLS), material, place, velocity=(SPEED, 0.0, 0.0))
-    sim = wc.Simulation(scene, ask.respond(*PENALTY), fps=FPS)
+    sim = wc.Simulation(scene, fps=FPS)
     mass = masses(sim, 1)
 
     def look() -> tuple[float, ...]:
@@ -93,24 +90,23 @@ def drag(ask: Ask, ratio: float, fixed: bool) -> Figures:
     yield Figure(label, "largest jump of the force at a vertex [of W]", float(jump))
 
 
-def compare(ask: Ask, ratio: float) -> Figures:
+def compare(ratio: float) -> Figures:
     """On the deformable block with the weights, then without; the reference is with them."""
-    on = list(drag(ask, ratio, fixed=False))
+    on = list(drag(ratio, fixed=False))
     yield from on
-    for how in (CLOSEST, EQUAL):
-        with switched_off(how):
-            off = list(drag(ask, ratio, fixed=False))
-        for f, without in zip(on, off, strict=True):
-            yield Figure(f"A9 facets 1:{ratio:g}, {how}", f.name, without.value, f.value)
+    with closest():
+        off = list(drag(ratio, fixed=False))
+    for f, without in zip(on, off, strict=True):
+        yield Figure(f"A9 facets 1:{ratio:g}, closest vertex", f.name, without.value, f.value)
 
 
 @contextmanager
-def switched_off(how: str) -> Iterator[None]:
+def closest() -> Iterator[None]:
     """Contacts of vertices without weights, in the block of a with statement."""
     count = narrow_phase.count_contacts
 
     def count_contacts(work, *others):
-        inputs = [how == CLOSEST, work.mesh.n_body, work.contacts.n_vertex]
+        inputs = [work.mesh.n_body, work.contacts.n_vertex]
         wp.launch(level, work.capacity.contacts, inputs, outputs=[work.contacts.record])
         count(work, *others)
 
@@ -121,13 +117,12 @@ def switched_off(how: str) -> Iterator[None]:
 @wp.kernel
 def level(
     # in
-    closest: bool,
     n_body: int,
     n_contact: wp.array[int],  # (1,)
     # in, out
     contact: wp.array[Contact],  # (capacity,)
 ):
-    """One thread per contact: one corner of the triangle takes all of it, or each a third."""
+    """One thread per contact: the closest corner of the triangle takes all of it."""
     c = wp.tid()
     if c >= n_contact[0] or contact[c].pair[1] >= n_body or contact[c].coef[0] == 0.0:
         return
@@ -135,5 +130,5 @@ def level(
     most = wp.where(coef[3] < coef[2], 3, 2)
     most = wp.where(coef[4] < coef[most], 4, most)
     for k in range(2, 5):
-        coef[k] = wp.where(closest, wp.where(k == most, -1.0, 0.0), -1.0 / 3.0)
+        coef[k] = wp.where(k == most, -1.0, 0.0)
     contact[c].coef = coef

@@ -3,7 +3,6 @@
     bar on a wall, h and dt together     1 - e, 1 - energy   0.70, 1.0 for symplectic Euler with
                                                              projection, 0.50 for implicit Euler
     block that slides down a slope, dt   place               1, that of symplectic Euler
-    bar that rests and trembles, dt      state               1
     Hertz, elements across the contact   pressure, L2        0.5 to 1.0 with linear elements
                                          displacement, L2    2 with linear elements
 
@@ -19,12 +18,11 @@ from measure.figure import Figure, Figures
 
 import warp_contact as wc
 from verification import bars, friction, hertz
-from verification.relax import relax, step_rate
-from verification.setup import ALIGNED, Ask, G, masses, watch
+from verification.setup import ALIGNED, masses, watch
 
 ELEMENTS = 10, 20, 40, 80  # along the bar
-# Of the sliding block and the resting bar. The first is about the stable step; finer ones differ
-# by less than they tremble, 2e-5 m.
+# Of the sliding block. The first is about the stable step; finer ones differ by less than they
+# tremble, 2e-5 m.
 FPS, SUBSTEPS = 240, (8, 16, 32)
 MU, START, SLIDES = 0.25, 1.0, 0.5  # friction on the slope of 1/2, speed [m/s], duration [s]
 
@@ -34,21 +32,16 @@ SMOOTH = 1.0, (0.1, 0.05, 0.01)
 PRESSURE = 1.0, (0.6, 0.2, 0.0)
 SHAPE = 2.0, (1.0, 0.2, 0.0)
 
-LENGTH, YOUNG, DENSITY, LAYERS = 1.0, 1e5, 1000.0, 10  # of the bar that rests, and its cells
-WAVE = float(np.sqrt(YOUNG / DENSITY))  # speed in it [m/s]
-ON_PLANE = 5.0 * YOUNG * LENGTH / LAYERS  # of a penalty [N/m]
-DIP, WAIT = 0.3, 10  # start, of the weight; until [frames]: L / c, a quarter of a period
 RINGS = 4, 8, 16  # of nested meshes, 1, 2 and 4 elements across the contact
 
 
-def run(ask: Ask) -> Figures:
-    """Impact, sliding, resting, Hertz; the quick run leaves out what is finest."""
-    last = -1 if ask.quick else None
-    yield from impact(ask, ELEMENTS[:last])
-    yield from sliding(ask)
-    yield from resting(ask)
-    yield from pressure(ask, hertz.COUNTS[:last])
-    yield from shape(ask, 0.5 if ask.quick else 1.0)
+def run(quick: bool) -> Figures:
+    """Impact, sliding, Hertz; the quick run leaves out what is finest."""
+    last = -1 if quick else None
+    yield from impact(ELEMENTS[:last])
+    yield from sliding()
+    yield from pressure(hertz.COUNTS[:last])
+    yield from shape(0.5 if quick else 1.0)
 
 
 def order(label: str, name: str, counts, errors, target: tuple[float, tuple]) -> Figure:
@@ -66,9 +59,9 @@ def listed(counts) -> str:
     return ", ".join(map(str, counts))
 
 
-def impact(ask: Ask, counts) -> Figures:
+def impact(counts) -> Figures:
     """Restitution and energy of a bar on a wall; the step follows the elements."""
-    found = [bars.record(bars.IMPACTS["on a wall"], ask, n) for n in counts]
+    found = [bars.record(bars.IMPACTS["on a wall"], n) for n in counts]
     _, energy, _, _, e = zip(*found, strict=True)
     label = f"A8 bar on a wall, N = {listed(counts)}"
     yield order(label, "order of 1 - e", counts, 1.0 - np.array(e), IMPACT)
@@ -76,73 +69,39 @@ def impact(ask: Ask, counts) -> Figures:
     yield order(label, "order of the energy lost", counts, lost, IMPACT)
 
 
-def in_steps(what: tuple[str, str], of, start: tuple, x: np.ndarray, seconds: float) -> Figure:
-    """Order of ``of(sim)`` [m] after some time, from differences of successive steps.
+def sliding() -> Figures:
+    """Place of a block on a slope, from differences of successive steps.
 
-    ``what`` are the words for body and ``of``, ``start`` is a scene, a response and the frames per
-    second, ``x`` the positions [m].
+    It is in motion from the start: letting go is not smooth.
     """
-    found = []
-    for n in SUBSTEPS:
-        sim = wc.Simulation(*start, substeps=n)
-        sim.state.x.assign(x)
-        watch(sim, seconds)
-        found.append(of(sim).astype(float))
-    errors = [np.linalg.norm(b - a) for a, b in pairwise(found)]
-    label, name = f"A8 {what[0]}, {listed(SUBSTEPS)} steps a frame", f"order of the {what[1]} in dt"
-    return order(label, name, SUBSTEPS[:-1], errors, SMOOTH)
-
-
-def sliding(ask: Ask) -> Figures:
-    """Place of a block on a slope, in motion from the start: letting go is not smooth."""
+    x, found = friction.begin(friction.SLOPE, MU).positions(), []
     scene = friction.build(friction.SLOPE, MU, (START, 0.0, 0.0))
-    start = scene, ask.respond(*friction.PENALTY), FPS
-    x = friction.begin(ask, friction.SLOPE, MU).positions()
-    what = "sliding block", "place"
-    yield in_steps(what, lambda sim: friction.centre(sim)[0, :1], start, x, SLIDES)
+    for n in SUBSTEPS:
+        sim = wc.Simulation(scene, fps=FPS, substeps=n)
+        sim.state.x.assign(x)
+        watch(sim, SLIDES)
+        found.append(friction.centre(sim)[0, 0])
+    label = f"A8 sliding block, {listed(SUBSTEPS)} steps a frame"
+    yield order(label, "order of the place in dt", SUBSTEPS[:-1], np.diff(found), SMOOTH)
 
 
-def resting(ask: Ask) -> Figures:
-    """State of a bar that trembles about its settlement on a plane and never leaves it.
-
-    It starts at rest with a part of its weight; velocities count by length over wave speed.
-    """
-
-    def standing(part: float, fps: float) -> tuple:
-        scene = wc.Scene(gravity=(0.0, 0.0, -part * G), friction=0.0)
-        scene.add_plane((0.0, 0.0, 1.0))
-        mesh = wc.box((LENGTH / LAYERS, LENGTH / LAYERS, LENGTH), (1, 1, LAYERS))
-        scene.add_body(mesh, wc.Corotated(YOUNG, 0.0, DENSITY), (0, 0, 0.5 * LENGTH))
-        return scene, ask.respond(ON_PLANE), fps
-
-    def state(sim: wc.Simulation) -> np.ndarray:
-        return np.append(sim.positions(), sim.velocities() * LENGTH / WAVE)
-
-    at_rest = wc.Simulation(*standing(DIP, step_rate(LENGTH / LAYERS, WAVE)))
-    omega, rate = 0.5 * np.pi * WAVE / LENGTH, 10.0 * WAVE / LENGTH
-    for _ in relax(at_rest, omega, round(14.0 / omega * at_rest.fps)):
-        pass
-    what, x = ("resting bar", "state"), at_rest.positions()
-    yield in_steps(what, state, standing(1.0, rate), x, WAIT / rate)
-
-
-def pressure(ask: Ask, counts) -> Figures:
+def pressure(counts) -> Figures:
     """L2 error of the pressure below a sphere and a cylinder."""
     for body, case in (("sphere", hertz.on_plane), ("cylinder", hertz.line_on_plane)):
-        found = (case(ask, n, ALIGNED) for n in counts)
+        found = (case(n, ALIGNED) for n in counts)
         errors = [next(f.value for f in figures if f.name == hertz.OVERALL) for figures in found]
         label = f"A8 {body} on plane, N = {listed(counts)}"
         yield order(label, "order of the pressure, L2", counts, errors, PRESSURE)
 
 
-def shape(ask: Ask, across: float) -> Figures:
+def shape(across: float) -> Figures:
     """L2 norm of the displacement below a sphere; differences of successive, nested meshes.
 
     ``across`` elements are in the contact of the first.
     """
     depth, found = hertz.CONTACT**2 / hertz.RADIUS, []
     for rings in RINGS:
-        sim, _ = hertz.press(ask, across * rings / RINGS[0], depth, ALIGNED, rings)
+        sim, _ = hertz.press(across * rings / RINGS[0], depth, ALIGNED, rings)
         start = sim.scene.bodies[0].x
         if not found:
             first, weight = start, masses(sim)

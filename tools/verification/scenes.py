@@ -6,7 +6,7 @@ import numpy as np
 from measure.figure import Figure, Figures
 
 import warp_contact as wc
-from verification.setup import Ask, facing, height
+from verification.setup import facing, height
 from warp_contact import SimulationError, scenes
 from warp_contact.scenes import membrane_stack
 
@@ -25,17 +25,17 @@ CARRIED = {  # who carries whom, by their order in the scene; elsewhere the firs
 TIMES = 0.0, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0  # of the energies that are shown [s]
 
 
-def run(ask: Ask) -> Figures:
+def run(quick: bool) -> Figures:
     """Every scene but the bowl."""
     for name in sorted(set(scenes.names()) - {"bowl"}):
         module = scenes.load(name)
         for response in (wc.ContactSurface(), wc.Penalty(**module.PENALTY)):
-            yield from play(name, module.build(), response, QUICK if ask.quick else DURATION)
+            yield from play(name, module.build(), response, QUICK if quick else DURATION)
 
 
-def bowl(ask: Ask) -> Figures:
+def bowl(quick: bool) -> Figures:
     """The bowl of fruit in 64 steps a frame: long on a CPU."""
-    settings, seconds = ({"fraction": 0.2}, 0.25) if ask.quick else ({}, DURATION)
+    settings, seconds = ({"fraction": 0.2}, 0.25) if quick else ({}, DURATION)
     return play("bowl", scenes.load("bowl").build(**settings), wc.ContactSurface(), seconds, 64)
 
 
@@ -67,9 +67,6 @@ def play(name: str, scene: wc.Scene, response, seconds: float, substeps=None) ->
     note = f"in frame {frame}: {' in '.join(pair)}" if pair else ""
     deepest = 100.0 * overlap[frame]
     yield Figure(case, "deepest overlap [% of an edge]", deepest, most=most, note=note)
-    yield Figure(case, f"overlap at {end} [% of an edge]", 100.0 * overlap[-1])
-    yield Figure(case, "kinetic energy, largest [J]", max(m.kinetic for m in measured))
-    yield Figure(case, f"kinetic energy at {end} [J]", measured[-1].kinetic)
     for figure, value in SHOWN.get(name, lambda *_: {})(sim, measured).items():
         yield Figure(case, figure, value)
 

@@ -1,39 +1,23 @@
-"""What the cases share: what is asked of them, meshes, orientations, responses, samples of a run.
+"""What the cases share: meshes, orientations, samples of a run, relaxation.
 
 A method that is right only for one mesh, or only along the axes, is not right: cases run on meshes
 that are structured, mirrored and jittered, and along the axes and turned.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
+import warp as wp
 
 import warp_contact as wc
 from warp_contact.scene.scene import rotation_matrix
+from warp_contact.step.forces import internal_forces
 
 G = 9.81  # [m/s^2]
 MESHES = "structured", "mirrored", "jittered"
 JITTER = 0.15  # of a cell: largest shift of a vertex; no tet comes near to inverting
 ANGLES = 17.0, 31.0, 53.0  # of what is turned, about x, then y, then z [degrees]
-RESPONSES = {  # by the constants of a penalty of the case [N/m], [N s/m]
-    "default": lambda *penalty: wc.ContactSurface(),
-    "literal": lambda *penalty: wc.ContactSurface("literal"),
-    "penalty": wc.Penalty,
-    "predicted": lambda *penalty: wc.PredictedForce(),
-}
-
-
-class Ask(NamedTuple):
-    """What is asked of a case."""
-
-    quick: bool = True  # fewer variants
-    response: str = "default"  # one of ``RESPONSES``
-    seed: int = 0  # of jittered meshes
-
-    def respond(self, stiffness: float, damping: float = 0.0):
-        """The response; a penalty takes the constants of the case [N/m], [N s/m]."""
-        return RESPONSES[self.response](stiffness, damping)
+ZETA = 0.7  # of the slowest mode: the fastest decay without a long tail
 
 
 class Pose:
@@ -98,6 +82,52 @@ def gradients(x: np.ndarray, tets: np.ndarray) -> np.ndarray:
 def watch(sim: wc.Simulation, seconds: float, of: Callable = lambda: None) -> np.ndarray:
     """Step for some time [s]; what ``of()`` is after each frame, shape (frames, ...)."""
     return np.array([of() for _ in sim.frames(round(seconds * sim.fps))])
+
+
+def step_rate(edge: float, speed: float) -> float:
+    """Frames per second [1/s] of about one stable step, for the shortest edge of a cell [m].
+
+    The tets of a cell have modes of some 3.5 speed / edge, with the speed of the waves [m/s].
+    """
+    return 3.0 * speed / edge
+
+
+def rest(
+    sim: wc.Simulation, omega: float, lasts: float, of: Callable, part=0.2, least=0, zeta=ZETA
+) -> np.ndarray:
+    """Let a scene come to rest; what ``of()`` is after each of the last frames, shape (n, ...).
+
+    It ``lasts`` for so many 1 / ``omega`` [1/s], that of the slowest mode, ``least`` frames at
+    least, of which a ``part`` are the last.
+
+    After each frame of one or two steps velocities are multiplied by s = exp(-2 zeta omega / fps):
+    viscous damping proportional to the mass (Underwood 1983), which leaves the equilibrium alone.
+    Those of symplectic Euler lag by h/2, so what is scaled is v + h/2 f/m; scaling v itself would
+    feed fast modes. A frame of more steps would see modes of a whole number of half periods always
+    at rest and never damp them.
+    """
+    frames, found = max(least, int(np.ceil(lasts / omega * sim.fps))), []
+    factor, mobile = np.exp(-2.0 * zeta * omega / sim.fps), sim.model.inv_mass.numpy() > 0.0
+    for frame in sim.frames(frames):
+        if frame > (1.0 - part) * frames:
+            found.append(of())
+        ahead = 0.5 * acceleration(sim) / (sim.fps * max(sim.substeps, 1))
+        v = sim.velocities()
+        calmed = np.where(mobile[:, None], factor * (v + ahead) - ahead, v)
+        sim.state.v.assign(calmed.astype(np.float32))
+    return np.array(found)
+
+
+def acceleration(sim: wc.Simulation) -> np.ndarray:
+    """By elasticity and gravity [m/s^2], none where contact balances them; shape (n_vert, 3)."""
+    model = sim.model
+    f_tet, on = wp.zeros(4 * model.n_tet, dtype=wp.vec3), wp.full(model.n_tet, 1, dtype=int)
+    internal_forces(model, sim.state.x, on, f_tet)
+    a = np.zeros((model.n_vert, 3))
+    np.add.at(a, model.tets.numpy().ravel(), f_tet.numpy().reshape(-1, 3).astype(float))
+    a = model.inv_mass.numpy()[:, None] * a + np.array(model.gravity)
+    a[sim.contact_fields()["pressure"] > 0.0] = 0.0
+    return a
 
 
 def forces(sim: wc.Simulation, *pairs: tuple[str, str]) -> list[float]:

@@ -20,8 +20,7 @@ import numpy as np
 from measure.figure import Figure, Figures, relative, zero
 
 from verification.columns import Column, Pile, between
-from verification.relax import ZETA, rest
-from verification.setup import ALIGNED, MESHES, Ask, G, Pose
+from verification.setup import ALIGNED, MESHES, ZETA, G, Pose, rest
 
 # Good: the quantum of the paper's search, 2^-5 of the overlap. Excellent: half of what penalty
 # forces of 100 E / L leave. Best: float32.
@@ -64,17 +63,17 @@ CASES = {
 }
 
 
-def run(ask: Ask) -> Figures:
+def run(quick: bool) -> Figures:
     """Every case on all meshes, of 4 or 6 cells across the upper column; quick on two."""
     quick = ((4, "structured", False), (6, "jittered", True))
     full = [(n, mesh, turned) for n in (4, 6) for mesh in MESHES for turned in (False, True)]
     for name in CASES:
-        for across, mesh, turned in quick if ask.quick else full:
-            yield from press(name, ask, across, mesh, Pose(turned))
-    yield from press("equal", ask, 6, "structured", ALIGNED, DAMPED)
+        for across, mesh, turned in quick if quick else full:
+            yield from press(name, across, mesh, Pose(turned))
+    yield from press("equal", 6, "structured", ALIGNED, DAMPED)
 
 
-def press(name: str, ask: Ask, across: int, mesh: str, pose: Pose, damped=0.0) -> Figures:
+def press(name: str, across: int, mesh: str, pose: Pose, damped=0.0) -> Figures:
     """Let the columns push each other apart, to rest.
 
     ``damped``: of the slowest mode, by the material instead of by relaxation.
@@ -84,12 +83,12 @@ def press(name: str, ask: Ask, across: int, mesh: str, pose: Pose, damped=0.0) -
     columns = []
     for k, (e, length, n) in enumerate(((case.e1, case.l1, 4), (case.e2, case.l2, across))):
         density = case.density or 1e-2 * e
-        columns.append(Column(e, length, density, (n, n, LAYERS), mesh=mesh, seed=ask.seed + k))
+        columns.append(Column(e, length, density, (n, n, LAYERS), mesh=mesh, seed=k))
     omega = min(c.slowest for c in columns)
     columns = [c._replace(damping=2.0 * damped / omega) for c in columns]
     gravity = G if case.density else 0.0
     pile = Pile(columns, -case.overlap, clamped=True, pose=pose, gravity=gravity)
-    sim = pile.simulate(ask)
+    sim = pile.simulate()
     lasts = SETTLE * (ZETA / damped if damped else 1.0)
     force = rest(sim, omega, lasts, lambda: between(sim), calmed=not damped).mean()
     exact, interface = case.exact
@@ -110,23 +109,22 @@ def press(name: str, ask: Ask, across: int, mesh: str, pose: Pose, damped=0.0) -
         yield relative(label, "stress of the worst layer [Pa]", worst, exact, LIMITS)
 
 
-def stack(ask: Ask) -> Figures:
+def stack(quick: bool) -> Figures:
     """Equal and other cells; the full run turns them, mirrors and jitters the meshes too."""
     plain = [(cells, "structured", False) for cells in CELLS]
     more = [(cells, mesh, True) for cells in CELLS for mesh in ("mirrored", "jittered")]
-    for cells, mesh, turned in plain if ask.quick else plain + more:
-        yield from stand(ask, cells, mesh, Pose(turned))
+    for cells, mesh, turned in plain if quick else plain + more:
+        yield from stand(cells, mesh, Pose(turned))
 
 
-def stand(ask: Ask, cells: tuple[int, int], mesh: str, pose: Pose) -> Figures:
+def stand(cells: tuple[int, int], mesh: str, pose: Pose) -> Figures:
     """Forces between the cubes and the height of the top."""
     label = f"A1 stack of five {cells[0]}:{cells[1]} {mesh} {pose.name}"
     cubes = []
     for k in range(COUNT):
-        count, seed = (cells[k % 2],) * 3, ask.seed + k
-        cubes.append(Column(YOUNG, 1.0, DENSITY, count, mesh=mesh, seed=seed))
+        cubes.append(Column(YOUNG, 1.0, DENSITY, (cells[k % 2],) * 3, mesh=mesh, seed=k))
     pile = Pile(cubes, GAP, pose=pose, gravity=G, friction=0.3)
-    sim = pile.simulate(ask, 0.0)
+    sim = pile.simulate(0.0)
     found = rest(sim, cubes[0].slowest / COUNT, STACK_SETTLE, lambda: between(sim))
     for k, pressure in enumerate(found.mean(axis=0)):
         exact = DENSITY * G * (COUNT - 1 - k)

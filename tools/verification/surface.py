@@ -8,10 +8,10 @@ where the block's own surface was.
 from itertools import product
 
 import numpy as np
-from measure.figure import Figure, Figures, zero
+from measure.figure import Figures, zero
 
 import warp_contact as wc
-from verification.setup import Ask, facing, height
+from verification.setup import facing, height
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import Work, allocate_work
 from warp_contact.step import broad_phase, residual, search, surface
@@ -34,9 +34,9 @@ MATERIALS = {
 SEARCHES = "balanced", "literal"
 
 
-def run(ask: Ask) -> Figures:
+def run(quick: bool) -> Figures:
     """Every combination, whatever the response; the quick run takes one material."""
-    materials = list(MATERIALS)[: 1 if ask.quick else None]
+    materials = list(MATERIALS)[: 1 if quick else None]
     for way, name, cells, ratio in product(SEARCHES, materials, CELLS, RATIOS):
         case = f"surface {way} {cells[0]}:{cells[1]} 1:{ratio:g} {name}"
         yield from place(case, way, *MATERIALS[name], cells, ratio)
@@ -58,7 +58,7 @@ def prepare(way: str, model, poisson: float, cells, ratio: float) -> tuple[wc.Si
 def place(case: str, way: str, *block) -> Figures:
     """Figures of one combination; those of the literal search are shown only."""
     sim, work = prepare(way, *block)
-    calls = settle(sim, work)
+    settle(sim, work)
     _, _, cells, ratio = block
     wanted = way == "balanced"
     stiff = ratio * cells[1] / cells[0]  # k of the upper block over that of the lower one
@@ -70,8 +70,6 @@ def place(case: str, way: str, *block) -> Figures:
         z = at[np.unique(own), 2].astype(float)
         off = 100.0 * (z.mean() - expected) / OVERLAP
         yield zero(case, f"surface of the {name} block [% of overlap]", off, most)
-    scatter = 100.0 * float(np.std(x[1][np.unique(tris[1]), 2])) / OVERLAP
-    yield Figure(case, "its scatter, standard deviation [% of overlap]", scatter)
     # At the vertices of both surfaces; nan beside the other one.
     top, bottom = (at[np.unique(own)] for at, own in zip(x, tris, strict=True))
     above = height(top, x[1], tris[1]) - top[:, 2]
@@ -83,7 +81,6 @@ def place(case: str, way: str, *block) -> Figures:
     ):
         limits = (1.0,) if wanted else ()
         yield zero(case, f"{figure} [% of overlap]", 100.0 * value / OVERLAP, limits)
-    yield Figure(case, "calls of stage 4 until nothing is left", calls)
     sim, work = prepare(way, *block)  # at rest, of rest shapes that carry no force
     step_of(sim.response, overlapping=True)(sim.model, sim.state, work, 0)
     speed = float(np.linalg.norm(sim.velocities(), axis=1).max()) / (OVERLAP / DT)
@@ -91,18 +88,17 @@ def place(case: str, way: str, *block) -> Figures:
     yield zero(case, figure, speed, (1e-6,) if wanted else ())
 
 
-def settle(sim: wc.Simulation, work: Work) -> int:
-    """Let stage 4 move the surfaces until nothing is left; return how often it was called."""
+def settle(sim: wc.Simulation, work: Work) -> None:
+    """Let stage 4 move the surfaces until nothing is left."""
     model, state, tries = sim.model, sim.state, sim.response.iterations
     balanced = sim.response.search == "balanced"
-    for call in range(CALLS):
+    for _ in range(CALLS):
         broad_phase.refresh(model, state.x, state.x, work)
         (detect if balanced else detect_vertices)(model, state.x, state.x, work)
         residual.find_gaps(model, state.x, work)
         if not work.surface.any_open.numpy()[0]:
-            return call
+            return
         if balanced:
             surface.resolve_overlaps(model, state, work, tries)
         else:
             search.bisect(model, state.x, work, tries)
-    return CALLS

@@ -14,8 +14,7 @@ from measure.figure import Figure, Figures, relative, zero
 
 import warp_contact as wc
 from verification.columns import Column, Pile, between
-from verification.relax import rest
-from verification.setup import Ask, G, forces, masses, watch
+from verification.setup import G, forces, masses, rest, watch
 from warp_contact.measure.contact_fields import vertex_area
 
 EDGE = 0.1  # of a block [m]
@@ -40,8 +39,6 @@ TIPS = np.array([[-0.03, -0.025], [0.035, -0.02], [0.005, 0.04]])  # (x, y) [m]
 SPIKE = 0.02  # height of a supporting tet [m]
 STIFF = 20.0  # times the modulus of the block on the tips: it tilts by its dents, 1e-3
 GRIP = 0.02  # friction on the tips: holds against that tilt, adds 2e-4 to the size of a force
-PENALTY = 500.0, 1.0  # [N/m], [N s/m]: sinks by 1 % of an edge of a cell
-ON_TIP = 1e4, 1.0  # the same for the single contact of a tip
 MASSES = 1.0, 10.0, 100.0, 1e3, 1e4  # R
 CUBES, APART = (2, 3), 3e-5  # cells of the light and the heavy cube, gap at the start [m]
 REST, LEAST = 10.0, 200  # 1 / (slowest frequency), frames
@@ -52,13 +49,13 @@ RIPPLE = 0.05, 0.005, 1e-5
 CENTRE = 0.02, 0.001, 1e-5  # of an edge of the block: the moment balance, as sharp as the force
 
 
-def run(ask: Ask) -> Figures:
+def run(quick: bool) -> Figures:
     """What carries the block, one after the other; the quick run takes the first two stacks."""
-    for case, stack in list(STACKS.items())[: 2 if ask.quick else None]:
-        yield from stacked(f"A7 {case}", stack, ask)
-    yield from centre("A7 on a plane, centre of pressure", ask)
-    yield from on_sheet("A7 on a membrane", ask)
-    yield from on_points("A7 on three points", ask)
+    for case, stack in list(STACKS.items())[: 2 if quick else None]:
+        yield from stacked(f"A7 {case}", stack)
+    yield from centre("A7 on a plane, centre of pressure")
+    yield from on_sheet("A7 on a membrane")
+    yield from on_points("A7 on three points")
 
 
 def rubber(stiff: float = 1.0) -> wc.NeoHookean:
@@ -66,14 +63,14 @@ def rubber(stiff: float = 1.0) -> wc.NeoHookean:
     return wc.NeoHookean(stiff * YOUNG, POISSON, DENSITY, DAMPING)
 
 
-def settled(ask: Ask, bodies: list, friction=0.3, penalty=PENALTY, plane=False) -> wc.Simulation:
+def settled(bodies: list, friction=0.3, plane=False) -> wc.Simulation:
     """A scene of bodies, each the arguments of ``add_body``, after it came to rest."""
     scene = wc.Scene((0.0, 0.0, -G), friction)
     for body in bodies:
         scene.add_body(*body)
     if plane:
         scene.add_plane((0.0, 0.0, 1.0))
-    sim = wc.Simulation(scene, ask.respond(*penalty), fps=FPS)
+    sim = wc.Simulation(scene, fps=FPS)
     watch(sim, SETTLE)
     return sim
 
@@ -85,7 +82,7 @@ def steady(label: str, name: str, mean: float, force: np.ndarray, weight: float)
     yield zero(label, f"ripple of the force{name} [of the mean]", ripple, RIPPLE)
 
 
-def stacked(label: str, stack: tuple, ask: Ask) -> Figures:
+def stacked(label: str, stack: tuple) -> Figures:
     """Let a stack come to rest, then watch the forces between all that touches."""
     lower, upper, ratio, turn = stack
     soft = max(1.0, 1.0 / ratio)
@@ -95,19 +92,18 @@ def stacked(label: str, stack: tuple, ask: Ask) -> Figures:
         bodies.append((wc.box(EDGE, upper), rubber(ratio * soft), place, turn))
     carried = {("body0", "plane0"): ("plane0 on lower", len(bodies) * WEIGHT)}
     carried |= {("body0", "body1"): ("upper on lower", WEIGHT)} if upper else {}
-    sim = settled(ask, bodies, plane=True)
+    sim = settled(bodies, plane=True)
     found = watch(sim, STACK_SAMPLE, lambda: (*forces(sim, *carried), sim.measure().overlap)).T
     for (name, weight), force in zip(carried.values(), found[:-1], strict=True):
         yield from steady(label, f", {name}", force.mean(), force, weight)
     overlap = 100.0 * found[-1].max() / float(sim.model.body_edge.numpy().min())
     yield Figure(label, "deepest overlap [% of an edge]", overlap, most=0.1)
-    yield Figure(label, "kinetic energy at the end [J]", sim.measure().kinetic)
 
 
-def centre(label: str, ask: Ask) -> Figures:
+def centre(label: str) -> Figures:
     """Moment balance about the centre of mass, from the pressure at the vertices."""
     block = wc.box(EDGE, 3), rubber(), (0.0, 0.0, 0.5 * EDGE)
-    sim = settled(ask, [block], friction=0.0, plane=True)
+    sim = settled([block], friction=0.0, plane=True)
     mass = masses(sim)
 
     def look() -> tuple[float, ...]:
@@ -122,18 +118,18 @@ def centre(label: str, ask: Ask) -> Figures:
     yield relative(label, "sum of the nodal forces [N]", total, WEIGHT, FORCE)
 
 
-def on_sheet(label: str, ask: Ask) -> Figures:
+def on_sheet(label: str) -> Figures:
     """The block on a membrane held at its rim."""
     sheet = wc.box(SHEET, SHEET_CELLS)
     rim = np.abs(sheet.vertices[:, :2]).max(axis=1) > 0.499 * SHEET[0]
     place = (0.0, 0.0, 0.5 * SHEET[2] + 1e-3 + 0.5 * EDGE)
     sheet = sheet, rubber(20.0), (0, 0, 0), STRAIGHT, (0, 0, 0), rim
-    sim = settled(ask, [sheet, (wc.box(EDGE, 3), rubber(), place)])
+    sim = settled([sheet, (wc.box(EDGE, 3), rubber(), place)])
     force = watch(sim, SAMPLE, lambda: forces(sim, ("body0", "body1")))
     yield from steady(label, "", force.mean(), force, WEIGHT)
 
 
-def on_points(label: str, ask: Ask) -> Figures:
+def on_points(label: str) -> Figures:
     """The block on three tips."""
     angle = 2.0 * np.pi * np.arange(3) / 3.0
     foot = 0.5 * SPIKE * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle - 2.0], axis=1)
@@ -141,7 +137,7 @@ def on_points(label: str, ask: Ask) -> Figures:
     material = wc.NeoHookean(YOUNG, POISSON, DENSITY)
     bodies = [(spike, material, (x, y, 0.0), STRAIGHT, (0, 0, 0), True) for x, y in TIPS]
     bodies.append((wc.box(EDGE, 4), rubber(STIFF), (0.0, 0.0, 1e-4 + 0.5 * EDGE)))
-    sim = settled(ask, bodies, GRIP, ON_TIP)
+    sim = settled(bodies, GRIP)
     pairs = [(f"body{k}", "body3") for k in range(3)]
     mean = watch(sim, SAMPLE, lambda: forces(sim, *pairs)).mean(axis=0)
     mass, x = masses(sim, 3), sim.positions(3).astype(float)
@@ -150,10 +146,10 @@ def on_points(label: str, ask: Ask) -> Figures:
         yield relative(label, f"mean force on tip {k} [N]", force, part[k] * WEIGHT, FORCE)
 
 
-def ladder(ask: Ask) -> Figures:
+def ladder(quick: bool) -> Figures:
     """A light cube below a heavy one; the quick run leaves out every second ratio."""
-    for ratio in MASSES[:: 2 if ask.quick else 1]:
-        yield from carry(ask, ratio)
+    for ratio in MASSES[:: 2 if quick else 1]:
+        yield from carry(ratio)
 
 
 def cubes(ratio: float, young: float, damping: float = 0.0) -> Pile:
@@ -165,11 +161,11 @@ def cubes(ratio: float, young: float, damping: float = 0.0) -> Pile:
     return Pile(both, APART, -0.5 * EDGE, gravity=G, friction=0.3)
 
 
-def carry(ask: Ask, ratio: float) -> Figures:
+def carry(ratio: float) -> Figures:
     """Mean and ripple of the force on the light cube's top, and the overlap there."""
     label = f"A7m heavy on light, mass ratio {ratio:g}"
     young = 20.0 * ratio * DENSITY * G * EDGE
-    sim = cubes(ratio, young).simulate(ask, 0.0)
+    sim = cubes(ratio, young).simulate(0.0)
     omega = float(np.sqrt(young * EDGE / (ratio * DENSITY * EDGE**3)))
     force = rest(sim, omega, REST, lambda: between(sim), 0.5, LEAST)[:, 0]
     blocks = force[: len(force) // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)

@@ -8,13 +8,6 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
 from measure.figure import ORDER
-from verification.setup import Ask
-
-
-@pytest.fixture
-def ask(rng):
-    """A quick run with the default response, jittered meshes from the seed of the test."""
-    return Ask(quick=True, seed=int(rng.integers(2**31)))
 
 
 @pytest.fixture

@@ -17,8 +17,8 @@ def test_the_restitution_is_that_of_the_pressure_over_the_contact(name):
 
 
 @pytest.mark.parametrize("name", bars.IMPACTS)
-def test_bars_press_on_each_other_and_part_as_the_waves_say(name, ask, hold):
-    figures = list(bars.hit(name, ask, bars.IMPACTS[name], bars.ELEMENTS))
+def test_bars_press_on_each_other_and_part_as_the_waves_say(name, hold):
+    figures = list(bars.hit(name, bars.IMPACTS[name], bars.ELEMENTS))
     # target 2 % of the time, reached 2.7 % and -3.1 %: the dispersion of the mesh, see below
     part = {"end of the contact": "good"} if name in bars.UNEQUAL else {}
     best = dict.fromkeys(("pressure, mean", "largest pressure afterwards"), "best")
@@ -29,29 +29,25 @@ def test_bars_press_on_each_other_and_part_as_the_waves_say(name, ask, hold):
 
 
 @pytest.mark.parametrize("name", [name for name, i in bars.IMPACTS.items() if i.e < 1.0])
-def test_unequal_bars_part_when_exact_contact_on_the_same_mesh_does(name, ask):
-    figures = list(bars.hit(name, ask, bars.IMPACTS[name], bars.ELEMENTS))
+def test_unequal_bars_part_when_exact_contact_on_the_same_mesh_does(name):
+    figures = list(bars.hit(name, bars.IMPACTS[name], bars.ELEMENTS))
     apart = next(f for f in figures if f.name.startswith("end, difference of both"))
     # Reached 0.019 %, 0.032 % and 0.051 % of 2 L / c; a step is 0.31 %, 0.1 % and 0.1 % of it.
     assert abs(apart.value) < 0.1
 
 
 @pytest.mark.parametrize("name", bars.UNEQUAL)
-def test_unequal_bars_of_many_elements_part_as_the_waves_say(name, ask, hold):
+def test_unequal_bars_of_many_elements_part_as_the_waves_say(name, hold):
     impact = bars.faster(bars.IMPACTS[name])
-    hold(list(bars.hit(name, ask, impact, bars.FINE)), "excellent")
+    hold(list(bars.hit(name, impact, bars.FINE)), "excellent")
 
 
-def test_the_impact_converges_with_step_and_elements(ask, hold):
-    hold(orders.impact(ask, (10, 20, 40)), "excellent")
+def test_the_impact_converges_with_step_and_elements(hold):
+    hold(orders.impact((10, 20, 40)), "excellent")
 
 
-def test_sliding_converges_with_the_first_order_of_the_step(ask, hold):
-    hold(orders.sliding(ask), "excellent")
-
-
-def test_rest_converges_with_the_first_order_of_the_step(ask, hold):
-    hold(orders.resting(ask), "excellent")
+def test_sliding_converges_with_the_first_order_of_the_step(hold):
+    hold(orders.sliding(), "excellent")
 
 
 def test_an_error_that_does_not_fall_has_no_order():

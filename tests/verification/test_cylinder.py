@@ -37,12 +37,12 @@ def test_a_slice_has_the_elements_asked_for_and_lies_on_its_cylinder(n):
 
 
 @pytest.mark.parametrize("n", [1, 2])
-def test_a_cylinder_presses_on_a_plane_as_hertz_says(n, ask, hold):
+def test_a_cylinder_presses_on_a_plane_as_hertz_says(n, hold):
     # target the error of an exact active set. The half-width is read from n rows a side and errs
     # by 5 and 6 %; with elements 7 % shorter or longer by 1 to 13 %: the outer row holds or not.
-    hold(hertz.line_on_plane(ask, n, Pose()), "excellent", but={"half-width": "good"})
+    hold(hertz.line_on_plane(n, Pose()), "excellent", but={"half-width": "good"})
 
 
 @pytest.mark.slow
-def test_a_turned_cylinder_with_four_elements_has_the_pressure_of_hertz(ask, hold):
-    hold(hertz.line_on_plane(ask, 4, Pose(True)), "excellent", but={"half-width": "good"})
+def test_a_turned_cylinder_with_four_elements_has_the_pressure_of_hertz(hold):
+    hold(hertz.line_on_plane(4, Pose(True)), "excellent", but={"half-width": "good"})

@@ -48,15 +48,14 @@ def pair(cells: tuple[int, int], slab: bool, pose: Pose) -> Pile:
 
 def press(cells: tuple, slab: bool, pose: Pose) -> Figures:
     """Stresses of all tets and the force between the blocks."""
-    label = f"A2 {'slab' if slab else 'solid'} {cells[0]}:{cells[1]} structured {pose.name}"
+    label = f"A2 {'slab' if slab else 'solid'} {cells[0]}:{cells[1]} {pose.name}"
     pile = pair(cells, slab, pose)
     sim = pile.simulate(EXACT)
-    found = rest(
-        sim,
-        pile.columns[0].slowest,
-        SETTLE,
-        lambda: [*pile.pressures(sim, *sim.scene.bodies), *between(sim)],
-    )
+
+    def look() -> list[float]:
+        return [*pile.pressures(sim, *sim.scene.bodies), *between(sim)]
+
+    found = rest(sim, pile.columns[0].slowest, SETTLE, look)
     *stress, force = found.mean(axis=0)
     error, section = np.abs(np.array(stress) / EXACT - 1.0), THICK if slab else 1.0
     yield relative(label, "contact force / section [Pa]", force / section, EXACT, FORCE)

@@ -99,7 +99,6 @@ def sink_depths(sim: wc.Simulation, measured: list[wc.Measure]) -> dict[str, flo
         foot = sim.positions(cube)[np.unique(facing(cube.x, cube.mesh.surface, -1.0))]
         sink = 1e3 * (height(foot, sim.positions(sheet), top) - foot[:, 2])
         figures[f"sink depth of {cube.label}, largest [mm]"] = float(np.nanmax(sink))
-        figures[f"sink depth of {cube.label}, mean [mm]"] = float(np.nanmean(sink))
     return figures
 
 

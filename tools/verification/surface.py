@@ -13,10 +13,9 @@ from measure.figure import Figures, zero
 import warp_contact as wc
 from verification.setup import facing, height
 from warp_contact.data.overflow import Capacity
-from warp_contact.data.work import Work, allocate_work
+from warp_contact.data.work import allocate_work
 from warp_contact.step import broad_phase, residual, search, surface
 from warp_contact.step.detection import detect, detect_vertices
-from warp_contact.step.loop import step_of
 
 EDGE = 0.1  # of a block [m]
 YOUNG, DENSITY = 5e4, 1000.0  # of the lower block [Pa], [kg/m^3]
@@ -42,25 +41,33 @@ def run(quick: bool) -> Figures:
         yield from place(case, way, *MATERIALS[name], cells, ratio)
 
 
-def prepare(way: str, model, poisson: float, cells, ratio: float) -> tuple[wc.Simulation, Work]:
-    """Two blocks that overlap by ``OVERLAP`` in z, the lower one's top at z = ``EDGE``."""
+def found(way: str, law, poisson: float, cells, ratio: float) -> wc.Simulation:
+    """Two blocks that overlapped at z = ``EDGE``, the lower one's top, after stage 4."""
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
     upper = wc.box(EDGE, cells[1], mirrored=cells[0] % 2 == 1)
-    scene.add_body(wc.box(EDGE, cells[0]), model(YOUNG, poisson, DENSITY), (0, 0, 0.5 * EDGE))
+    scene.add_body(wc.box(EDGE, cells[0]), law(YOUNG, poisson, DENSITY), (0, 0, 0.5 * EDGE))
     high = (0.0, 0.0, 1.5 * EDGE - OVERLAP)
-    scene.add_body(upper, model(ratio * YOUNG, poisson, DENSITY), high)
+    scene.add_body(upper, law(ratio * YOUNG, poisson, DENSITY), high)
     sim = wc.Simulation(scene, wc.ContactSurface(way))
-    work = allocate_work(sim.model, sim.state, ROOM)
+    model, state, tries = sim.model, sim.state, sim.response.iterations
+    work = allocate_work(model, state, ROOM)
     work.dt.fill_(DT)
-    return sim, work
+    for _ in range(CALLS):
+        broad_phase.refresh(model, state.x, state.x, work)
+        (detect if way == "balanced" else detect_vertices)(model, state.x, state.x, work)
+        residual.find_gaps(model, state.x, work)
+        if not work.surface.any_open.numpy()[0]:
+            break
+        if way == "balanced":
+            surface.resolve_overlaps(model, state, work, tries)
+        else:
+            search.bisect(model, state.x, work, tries)
+    return sim
 
 
-def place(case: str, way: str, *block) -> Figures:
+def place(case: str, way: str, law, poisson: float, cells, ratio) -> Figures:
     """Figures of one combination; those of the literal search are shown only."""
-    sim, work = prepare(way, *block)
-    settle(sim, work)
-    _, _, cells, ratio = block
-    wanted = way == "balanced"
+    sim, wanted = found(way, law, poisson, cells, ratio), way == "balanced"
     stiff = ratio * cells[1] / cells[0]  # k of the upper block over that of the lower one
     expected = EDGE - OVERLAP * stiff / (1.0 + stiff)
     most = ((1.0 if cells[0] == cells[1] else 5.0),) if wanted else ()
@@ -79,26 +86,5 @@ def place(case: str, way: str, *block) -> Figures:
         ("largest overlap, vertical", max(-np.nanmin(gaps), 0.0)),
         ("deepest overlap, as measured", sim.measure().overlap),
     ):
-        limits = (1.0,) if wanted else ()
-        yield zero(case, f"{figure} [% of overlap]", 100.0 * value / OVERLAP, limits)
-    sim, work = prepare(way, *block)  # at rest, of rest shapes that carry no force
-    step_of(sim.response, overlapping=True)(sim.model, sim.state, work, 0)
-    speed = float(np.linalg.norm(sim.velocities(), axis=1).max()) / (OVERLAP / DT)
-    figure = "largest speed after one step [of overlap / dt]"
-    yield zero(case, figure, speed, (1e-6,) if wanted else ())
-
-
-def settle(sim: wc.Simulation, work: Work) -> None:
-    """Let stage 4 move the surfaces until nothing is left."""
-    model, state, tries = sim.model, sim.state, sim.response.iterations
-    balanced = sim.response.search == "balanced"
-    for _ in range(CALLS):
-        broad_phase.refresh(model, state.x, state.x, work)
-        (detect if balanced else detect_vertices)(model, state.x, state.x, work)
-        residual.find_gaps(model, state.x, work)
-        if not work.surface.any_open.numpy()[0]:
-            return
-        if balanced:
-            surface.resolve_overlaps(model, state, work, tries)
-        else:
-            search.bisect(model, state.x, work, tries)
+        part = 100.0 * value / OVERLAP
+        yield zero(case, f"{figure} [% of overlap]", part, (1.0,) if wanted else ())

@@ -1,10 +1,9 @@
-"""relax.py and columns.py: a hanging bar comes to its closed form and to rest."""
+"""setup.py and columns.py: a hanging bar comes to its closed form and to rest."""
 
 import numpy as np
 import pytest
 from verification.columns import Column, stress
-from verification.relax import relax, step_rate
-from verification.setup import MESHES, G, Pose, block, on_face
+from verification.setup import MESHES, G, Pose, block, on_face, rest, step_rate
 
 import warp_contact as wc
 
@@ -15,9 +14,9 @@ OMEGA = BAR.slowest
 def hanging(pose: Pose) -> wc.Simulation:
     """A bar that hangs from its upper end, unloaded at first."""
     scene = wc.Scene(gravity=pose.out((0.0, 0.0, -G)))
-    rest = block((*BAR.section, BAR.length), BAR.cells)
+    mesh = block((*BAR.section, BAR.length), BAR.cells)
     material = wc.Corotated(BAR.young, 0.0, BAR.density)
-    scene.add_body(rest, material, rotation=pose.q, fixed=on_face(rest, 2, 1))
+    scene.add_body(mesh, material, rotation=pose.q, fixed=on_face(mesh, 2, 1))
     return wc.Simulation(scene, fps=step_rate(0.25, BAR.wave_speed))
 
 
@@ -25,8 +24,7 @@ def hanging(pose: Pose) -> wc.Simulation:
 def test_a_hanging_bar_is_relaxed_to_its_elongation_and_to_rest(turned):
     pose = Pose(turned)
     sim = hanging(pose)
-    for _ in relax(sim, OMEGA, round(14.0 / OMEGA * sim.fps)):
-        pass
+    rest(sim, OMEGA, 14.0, lambda: None)
     z = pose.back(sim.positions())[:, 2]
     low = on_face(sim.scene.bodies[0].mesh, 2, -1)
     sunk = sim.scene.bodies[0].mesh.vertices[low, 2].mean() - z[low].mean()
@@ -40,8 +38,7 @@ def test_relaxation_leaves_prescribed_velocities_alone():
     sim = hanging(Pose())
     held = on_face(sim.scene.bodies[0].mesh, 2, 1)
     sim.set_velocity(0, (0.2, 0.0, 0.0), held)
-    for _ in relax(sim, OMEGA, 5):
-        pass
+    rest(sim, OMEGA, 0.0, lambda: None, least=5)
     np.testing.assert_array_equal(
         sim.velocities()[held], np.float32([[0.2, 0.0, 0.0]] * held.sum())
     )

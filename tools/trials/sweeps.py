@@ -41,7 +41,7 @@ def mass_stiffness(mass: float, young: float) -> Setting:
 
     At the largest mass ratio the pressure at rest is as large as the lower block's modulus. The
     weight of the upper block over its section is mass / (1e4 young) of its own moduli: beyond
-    16 to 40 it goes inside out, also where it is held at its base and touches nothing.
+    16 it may turn inside out, from 40 on also held at its base with nothing to touch.
     """
     base = 1e4 * 1000.0 * 9.81 * EDGE
     low = body(wc.box(EDGE, 2), soft(base), fixed="base")

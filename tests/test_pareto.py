@@ -43,7 +43,7 @@ def test_the_impulses_alone_move_no_surface(monkeypatch):
         return launch(kernel, *args, **kwargs)
 
     monkeypatch.setattr(wp, "launch", noted)
-    found = {setting.method: setting for setting in ours.QUICK[::-1]}
+    found = {setting.method: setting for setting in ours.ALL[::-1]}
     ours.run(blocks(), found["impulses alone"], None, 60.0)
     assert "impulse" in launched and launched.isdisjoint({"closure", "search"})
     ours.run(blocks(), found["default"], None, 60.0)
@@ -164,10 +164,7 @@ def test_a_failure_is_behind_everything_and_on_no_front():
     *fine, broken, absent = points()
     assert all(dominates(p, broken) and not dominates(broken, p) for p in fine)
     assert front([broken, absent]) == []
-    assert "error at most 0.01: between 3 s, exact 10 s\n" in report(
-        "", {"A": ""}, [broken, *fine[:3]]
-    )
-    assert "error at most 0.05: none\n" in report("", {"A": ""}, [broken])
+    assert "front: empty" in report("", {"A": ""}, [broken])
 
 
 def test_the_table_keeps_every_point(tmp_path):
@@ -198,13 +195,20 @@ def test_words_and_picture_keep_every_failure(tmp_path):
     pyplot.close(figure)
 
 
+def short(name: str) -> tuple:
+    """A scene of the paper, half a second of it, and its panels."""
+    from chart import scenes
+
+    task, panels = scenes.scene(name)
+    return replace(task, frames=30), panels
+
+
 def held(heights) -> tuple:
     """The squeezed sphere with its upper cube at so many edges over the sphere, frame by frame."""
-    from chart import scenes
     from engines.task import Motion, Numbered
     from verification.setup import mean_edge
 
-    task, panels = scenes.scene("squeezed_sphere", True)
+    task, panels = short("squeezed_sphere")
     scene = task.scene()
     whole = Numbered(scene)
     _, ball, top = whole.parts
@@ -239,7 +243,7 @@ def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
     from engines.ours import DEFAULT
     from verification.setup import mean_edge
 
-    task, (*_, panel) = scenes.scene("squeezed_sphere", True)
+    task, (*_, panel) = short("squeezed_sphere")
     motion = ours.run(task, DEFAULT, None, np.inf)
     # 0.0016 was seen; another machine may round other contacts into being.
     assert 0.0 < panel.error(task, motion) < 0.01
@@ -254,7 +258,7 @@ def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
 def test_the_converged_motion_hardly_changes_with_half_the_steps(name):
     from chart import scenes
 
-    task, _ = scenes.scene(name, True)
+    task, _ = short(name)
     half = scenes.converged(task, scenes.CONVERGED // 2)
     change = scenes.rms_distance(task, scenes.converged(task), half)
     print(change)
@@ -283,7 +287,7 @@ def test_every_pair_that_presses_is_in_its_scene():
     from chart import scenes
 
     for name, count in (("squeezed_sphere", 2), ("cubes_on_membrane", 3)):
-        labels = {body.label for body in scenes.scene(name, True)[0].scene().bodies}
+        labels = {body.label for body in scenes.scene(name)[0].scene().bodies}
         pairs = [pair for pair in scenes.PRESSED if labels & {*pair}]
         assert len(pairs) == count and {label for pair in pairs for label in pair} == labels
 

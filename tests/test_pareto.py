@@ -52,14 +52,13 @@ def test_the_impulses_alone_move_no_surface(monkeypatch):
 
 def test_held_vertices_stop_where_the_task_says_so():
     from engines import ours
-    from engines.ours import DEFAULT
 
     def build():
         scene = blocks().scene()
         scene.bodies[1].fixed[:] = True
         return scene
 
-    motion = ours.run(replace(blocks(), scene=build, frames=3, stop=1), DEFAULT, None, 60.0)
+    motion = ours.run(replace(blocks(), scene=build, frames=3, stop=1), ours.DEFAULT, None, 60.0)
     z = motion.x[:, 8:, 2].mean(axis=1)
     assert z[0] - z[1] == pytest.approx(0.5 / 240, rel=1e-4)  # float32 positions of 0.1 m
     np.testing.assert_array_equal(z[1:], z[1])
@@ -67,9 +66,8 @@ def test_held_vertices_stop_where_the_task_says_so():
 
 def test_a_run_beyond_its_time_fails_and_says_how_far_it_came():
     from engines import ours
-    from engines.ours import DEFAULT
 
-    motion = ours.run(replace(blocks(), frames=9), DEFAULT, None, 0.0)
+    motion = ours.run(replace(blocks(), frames=9), ours.DEFAULT, None, 0.0)
     assert motion.reason == "too slow: 2 of 9 frames in 0 s"
     assert motion.wall > 0.0 and motion.x is None
 
@@ -240,11 +238,10 @@ def test_a_margin_is_an_error_like_an_overlap():
 def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
     from chart import scenes
     from engines import ours
-    from engines.ours import DEFAULT
     from verification.setup import mean_edge
 
     task, (*_, panel) = short("squeezed_sphere")
-    motion = ours.run(task, DEFAULT, None, np.inf)
+    motion = ours.run(task, ours.DEFAULT, None, np.inf)
     # 0.0016 was seen; another machine may round other contacts into being.
     assert 0.0 < panel.error(task, motion) < 0.01
     edges = [mean_edge(body.mesh) for body in task.scene().bodies]

@@ -67,10 +67,10 @@ def panel(points: list[Point]) -> list[str]:
     of = {p.method: [q for q in points if q.method == p.method] for p in points}
     ahead = front(points)
     lines = [f"  front: {_show(p)}" for p in ahead] or ["  front: empty, every run failed"]
-    for method, all_of_it in of.items():
-        mine = [p for p in all_of_it if p.error is not None]
-        if mine and method not in {p.method for p in ahead}:
-            lines.append(f"  behind the front: {_show(min(mine, key=BY_ERROR))} is its best")
+    for method, mine in of.items():
+        fine = [p for p in mine if p.error is not None]
+        if fine and method not in {p.method for p in ahead}:
+            lines.append(f"  behind the front: {_show(min(fine, key=BY_ERROR))} is its best")
     own = front(of.get("default", []))
     if own:
         before = [m for m in of if any(dominates(p, q) for p in of[m] for q in own)]

@@ -1,7 +1,7 @@
 """Where time and memory go: one figure a line, as ``case.figure value``.
 
     python tools/bench.py [case ...] [--large] [--frames N] [--fraction PART]
-        [--repeats N] [--device NAME] [--out FILE]
+        [--repeats N] [--device NAME]
 
 Each case runs in a process of its own until there are contacts, then the same few steps again and
 again (a window, begun from the same state each time): as one captured graph, and uncaptured with a
@@ -43,8 +43,7 @@ from functools import partial
 import numpy as np
 from clock.figures import figures, sleep_figures, start_times
 from clock.scenes import FRACTION, PAIRS, Case, cases
-from measure import report
-from measure.figure import Figure
+from measure import machine
 from measure.run import command_line, count, one_of
 
 OTHERS = {"sleep": sleep_figures, "start": start_times}  # cases with figures of their own
@@ -60,22 +59,20 @@ def main() -> int:
     parser.add_argument("--fraction", type=float, default=FRACTION, help="of the bowl's fruits")
     parser.add_argument("--repeats", type=count, default=7, help="of a window")
     parser.add_argument("--device", help="cpu, cuda:0, ...")
-    parser.add_argument("--out", metavar="FILE", help="write all figures there as JSON")
     args = parser.parse_args()
     known = cases(True, args.fraction)
     chosen = args.cases or [*cases(args.large, args.fraction), *OTHERS]
     timed = {name: case for name, case in known.items() if name in chosen}
+    print(machine.line(args.device), "", sep="\n", flush=True)
     found: dict[str, float] = {}
     run = partial(figures, frames=args.frames, repeats=args.repeats, device=args.device)
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, spawn, max_tasks_per_child=1) as pool:
         for name, new in zip(timed, pool.map(run, timed.values()), strict=True):
             found |= show(f"{name}.", new)
-    found |= show("", summary(found, timed))
+    show("", summary(found, timed))
     for name in (n for n in OTHERS if n in chosen):
-        found |= show(f"{name}.", OTHERS[name](args.device))
-    if args.out:
-        report.write(args.out, [Figure("", *figure) for figure in found.items()], args.device)
+        show(f"{name}.", OTHERS[name](args.device))
     return 0
 
 

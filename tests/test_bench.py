@@ -37,19 +37,17 @@ def test_every_launch_belongs_to_a_stage(touching):
     modules = {module.name for module in pkgutil.iter_modules(warp_contact.step.__path__)}
     found = set(timing.stages) - {ALONE}
     assert {"forces", "broad_phase", "narrow_phase", "impulse"} <= found <= modules - {"step"}
-    assert timing.whole.launches == pytest.approx(sum(c.launches for c in timing.kernels.values()))
-    assert all(cost.bytes > 0 for cost in timing.stages.values())
+    assert all(cost.launches > 0.0 for cost in timing.stages.values())
     assert timing.step_ms > 0.0
     assert timing.elastic_ms > 0.0
 
 
 def test_shares_are_those_of_the_time_and_none_without_any(touching):
-    for times, shares in (((2.0, 1.0, 1.0), (0.75, 0.25)), ((0.0, 0.0, 0.0), (0.0, 0.0))):
-        keys = ("a", "x"), ("a", "y"), ("b", "x")
-        kernels = {key: Cost(1.0, ms, 8.0) for key, ms in zip(keys, times, strict=True)}
-        found = step_figures(Timing(1, 1.0, 1.0, 0.0, 0, kernels), touching.model)
+    for times, shares in (((3.0, 1.0), (0.75, 0.25)), ((0.0, 0.0), (0.0, 0.0))):
+        stages = {key: Cost(2.0, ms) for key, ms in zip("ab", times, strict=True)}
+        found = step_figures(Timing(1, 1.0, 1.0, 0.0, 0, stages), touching.model)
         assert (found["a.share"], found["b.share"]) == shares
-        assert found["a.launches"] == 2.0 and found["step.bytes"] == 24.0
+        assert found["a.launches"] == 2.0 and found["step.launches"] == 4.0
 
 
 def test_a_launch_outside_of_a_step_is_seen_as_such(device):
@@ -57,7 +55,7 @@ def test_a_launch_outside_of_a_step_is_seen_as_such(device):
     with StageTimer(device) as timer:
         a.fill_(2.0)
         wp.copy(b, a)
-    assert [o[:3] for o in timer.operations] == [(OTHER, "fill_", 20), (OTHER, "copy", 40)]
+    assert [stage for stage, _ in timer.operations] == [OTHER, OTHER]
     np.testing.assert_array_equal(b.numpy(), 2.0)
 
 

@@ -43,7 +43,7 @@ def test_the_impulses_alone_move_no_surface(monkeypatch):
         return launch(kernel, *args, **kwargs)
 
     monkeypatch.setattr(wp, "launch", noted)
-    found = {setting.method: setting for setting in ours.QUICK[::-1]}
+    found = {setting.method: setting for setting in ours.ALL[::-1]}
     ours.run(blocks(), found["impulses alone"], None, 60.0)
     assert "impulse" in launched and launched.isdisjoint({"closure", "search"})
     ours.run(blocks(), found["default"], None, 60.0)
@@ -52,14 +52,13 @@ def test_the_impulses_alone_move_no_surface(monkeypatch):
 
 def test_held_vertices_stop_where_the_task_says_so():
     from engines import ours
-    from engines.ours import DEFAULT
 
     def build():
         scene = blocks().scene()
         scene.bodies[1].fixed[:] = True
         return scene
 
-    motion = ours.run(replace(blocks(), scene=build, frames=3, stop=1), DEFAULT, None, 60.0)
+    motion = ours.run(replace(blocks(), scene=build, frames=3, stop=1), ours.DEFAULT, None, 60.0)
     z = motion.x[:, 8:, 2].mean(axis=1)
     assert z[0] - z[1] == pytest.approx(0.5 / 240, rel=1e-4)  # float32 positions of 0.1 m
     np.testing.assert_array_equal(z[1:], z[1])
@@ -67,9 +66,8 @@ def test_held_vertices_stop_where_the_task_says_so():
 
 def test_a_run_beyond_its_time_fails_and_says_how_far_it_came():
     from engines import ours
-    from engines.ours import DEFAULT
 
-    motion = ours.run(replace(blocks(), frames=9), DEFAULT, None, 0.0)
+    motion = ours.run(replace(blocks(), frames=9), ours.DEFAULT, None, 0.0)
     assert motion.reason == "too slow: 2 of 9 frames in 0 s"
     assert motion.wall > 0.0 and motion.x is None
 
@@ -96,7 +94,6 @@ def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
     for s, steps in taken.items():
         assert steps == (None if s.factor == 1 else s.factor * alone[s.method, s.times])
     assert [m.reason for m in motions if m.reason] == ["not finite", "no run with steps x1"]
-    assert {s.factor for s in taken if s.method == "predicted"} == {1, 2, 4}
 
 
 def test_a_run_that_failed_is_a_point_with_its_reason_in_every_panel():
@@ -164,10 +161,7 @@ def test_a_failure_is_behind_everything_and_on_no_front():
     *fine, broken, absent = points()
     assert all(dominates(p, broken) and not dominates(broken, p) for p in fine)
     assert front([broken, absent]) == []
-    assert "error at most 0.01: between 3 s, exact 10 s\n" in report(
-        "", {"A": ""}, [broken, *fine[:3]]
-    )
-    assert "error at most 0.05: none\n" in report("", {"A": ""}, [broken])
+    assert "front: empty" in report("", {"A": ""}, [broken])
 
 
 def test_the_table_keeps_every_point(tmp_path):
@@ -198,13 +192,20 @@ def test_words_and_picture_keep_every_failure(tmp_path):
     pyplot.close(figure)
 
 
+def short(name: str) -> tuple:
+    """A scene of the paper, half a second of it, and its panels."""
+    from chart import scenes
+
+    task, panels = scenes.scene(name)
+    return replace(task, frames=30), panels
+
+
 def held(heights) -> tuple:
     """The squeezed sphere with its upper cube at so many edges over the sphere, frame by frame."""
-    from chart import scenes
     from engines.task import Motion, Numbered
     from verification.setup import mean_edge
 
-    task, panels = scenes.scene("squeezed_sphere", True)
+    task, panels = short("squeezed_sphere")
     scene = task.scene()
     whole = Numbered(scene)
     _, ball, top = whole.parts
@@ -236,11 +237,10 @@ def test_a_margin_is_an_error_like_an_overlap():
 def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
     from chart import scenes
     from engines import ours
-    from engines.ours import DEFAULT
     from verification.setup import mean_edge
 
-    task, (*_, panel) = scenes.scene("squeezed_sphere", True)
-    motion = ours.run(task, DEFAULT, None, np.inf)
+    task, (*_, panel) = short("squeezed_sphere")
+    motion = ours.run(task, ours.DEFAULT, None, np.inf)
     # 0.0016 was seen; another machine may round other contacts into being.
     assert 0.0 < panel.error(task, motion) < 0.01
     edges = [mean_edge(body.mesh) for body in task.scene().bodies]
@@ -254,7 +254,7 @@ def test_a_motion_is_judged_by_its_distance_from_a_converged_one():
 def test_the_converged_motion_hardly_changes_with_half_the_steps(name):
     from chart import scenes
 
-    task, _ = scenes.scene(name, True)
+    task, _ = short(name)
     half = scenes.converged(task, scenes.CONVERGED // 2)
     change = scenes.rms_distance(task, scenes.converged(task), half)
     print(change)
@@ -283,7 +283,7 @@ def test_every_pair_that_presses_is_in_its_scene():
     from chart import scenes
 
     for name, count in (("squeezed_sphere", 2), ("cubes_on_membrane", 3)):
-        labels = {body.label for body in scenes.scene(name, True)[0].scene().bodies}
+        labels = {body.label for body in scenes.scene(name)[0].scene().bodies}
         pairs = [pair for pair in scenes.PRESSED if labels & {*pair}]
         assert len(pairs) == count and {label for pair in pairs for label in pair} == labels
 

@@ -217,6 +217,7 @@ def test_contact_fields_tell_who_touches_whom():
     [
         ({"fps": 0}, "fps 0 is not positive"),
         ({"fps": float("nan")}, "fps nan is not positive"),
+        ({"fps": float("inf")}, "fps inf is not positive"),
         ({"substeps": 0}, "substeps 0 is not a positive count"),
         ({"substeps": 1.5}, "substeps 1.5 is not a positive count"),
         ({"device": "abacus"}, "unknown device 'abacus'; this machine has cpu"),

@@ -4,7 +4,6 @@ import sys
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
@@ -34,11 +33,6 @@ def test_a_cell_within_the_frontier_is_fine(name):
     assert r.touched
 
 
-def test_the_frontier_runs_between_fine_and_other_cells():
-    sides = sweeps.frontier([["fine", "lost"], ["fine", "fine"]])
-    assert sides == [((0.5, 0.5), (-0.5, 0.5)), ((0.5, 1.5), (0.5, 0.5))]
-
-
 @pytest.mark.parametrize(("moduli", "want"), [(16.0, outcome.FINE), (40.0, outcome.INVERTED)])
 def test_a_block_carries_16_of_its_moduli_and_not_40_with_a_contact_and_without(moduli, want):
     """What limits the map of ratios at its lower rim is the material."""
@@ -46,14 +40,6 @@ def test_a_block_carries_16_of_its_moduli_and_not_40_with_a_contact_and_without(
     on_another = attempt(partial(sweeps.SWEEPS["ratio"].build, moduli, 1e-4))
     print(alone.volume, on_another.volume)
     assert classify(alone) == classify(on_another) == want
-
-
-def test_the_line_of_a_limit_ends_at_the_rim_of_the_map():
-    s = sweeps.SWEEPS["ratio"]
-    i, j = sweeps.limit_line(s)
-    # Mass ratios 10^0, 10^0.4, ... against stiffness ratios 10^-4, 10^-3.2, ...: from 10^1.2 on.
-    np.testing.assert_array_equal(i, np.arange(3, 11))
-    np.testing.assert_allclose(j, (0.4 * i - np.log10(25.0)) / 0.8)
 
 
 def test_the_map_writes_a_row_per_cell_and_a_picture(tmp_path, monkeypatch):

@@ -1,7 +1,7 @@
 """Where time and memory go: one figure a line, as ``case.figure value``.
 
     python tools/bench.py [case ...] [--large] [--frames N] [--fraction PART]
-        [--repeats N] [--device NAME] [--out FILE]
+        [--repeats N] [--device NAME]
 
 Each case runs in a process of its own until there are contacts, then the same few steps again and
 again (a window, begun from the same state each time): as one captured graph, and uncaptured with a
@@ -12,7 +12,6 @@ so that other processes on the machine hardly count; those of frames and starts 
     step.launches              kernels, fills, copies, scans and Bvh refits
     step.ms                    the captured step, as simulations run it
     step.ns_per_vertex         the same for each vertex
-    step.bytes                 sum of STAGE.bytes
     step.elastic_ms            a captured step without contact: damping, predict, drift
     step.operations_ms         sum of all operations, each without what its call costs
     step.overhead_us_per_launch  what the captured step takes beyond that, for each operation
@@ -20,23 +19,20 @@ so that other processes on the machine hardly count; those of frames and starts 
     step.of_bound              step.ms over 90 ns a tet, 150 ns a surface vertex, 1 us a contact
     STAGE.launches, .ms        of a stage: what a module of ``warp_contact/step`` launches itself;
                                ``step_alone`` is ``step.py``
-    STAGE.bytes                of the arrays given to its operations, those of a launch once: what
-                               moving each once would be; a list counts with all its room
     STAGE.share                of the sum of all operations
-    STAGE.ns_per_tet, .ns_per_surface_vertex, .ns_per_contact
-    STAGE.OPERATION.launches, .ms   of a kernel or memory operation; only in the file of --out
     frames_per_second          of whole frames of 1/60 s, with the choice of the step
     frame.choice_of_step_share    of the time of these frames
     contacts                   at the end of a step
     window_steps               steps of the window
-    array_bytes                in the Warp arrays of model, state and work; without the Bvhs
-    array_bytes_per_vertex     the same over the vertices
+    array_bytes_per_vertex     of the Warp arrays of model, state and work; without the Bvhs
     peak_rss_bytes             largest resident size of the process
 
-``launch_overhead_us`` is the overhead in the 95 vertices of squeezed_sphere, where it matters most.
-``pile.slope`` and ``worlds.slope`` are the exponents p of step.ms ~ vertices^p. ``import_s`` is the
-import of the package; ``warm_frame_s`` and ``cold_frame_s`` are the first frame after it, the scene
-included, with the kernels compiled before and with an empty kernel cache.
+``pile.slope`` and ``worlds.slope`` are the exponents p of step.ms ~ vertices^p. ``pairs_N`` are 64
+spheres of which N pairs touch; what contact adds to a step beyond that of ``pairs_0`` is about
+``pairs.any_ms + N pairs.each_ms``. ``sleep`` are frames of 32 blocks in 16 columns: while they
+settle, at rest, and asleep, with how far sleep let them come from where they else are [edges].
+``start.import_s`` is the import of the package; ``start.warm_frame_s`` and ``start.cold_frame_s``
+are the first frame after it, the scene included, with and without kernels compiled before.
 """
 
 import multiprocessing
@@ -44,64 +40,63 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
-from clock.figures import figures, log_slope, start_times
-from clock.scenes import FRACTION, Case, cases
-from measure import report
-from measure.figure import Figure
+import numpy as np
+from clock.figures import figures, sleep_figures, start_times
+from clock.scenes import FRACTION, PAIRS, Case, cases
+from measure import machine
 from measure.run import command_line, count, one_of
 
-START = "start"  # the case of the times until the first frame
-OVERHEAD = "squeezed_sphere"
+OTHERS = {"sleep": sleep_figures, "start": start_times}  # cases with figures of their own
 
 
 def main() -> int:
     """Run the cases and print their figures as they come."""
     parser = command_line(__doc__)
-    named = one_of([*cases(True, FRACTION), START])
+    named = one_of([*cases(True, FRACTION), *OTHERS])
     parser.add_argument("cases", nargs="*", type=named, metavar="case", help="or all")
     parser.add_argument("--large", action="store_true", help="a pile of 1e6 vertices, 4096 worlds")
     parser.add_argument("--frames", type=count, help="to run before, in place of each case's own")
     parser.add_argument("--fraction", type=float, default=FRACTION, help="of the bowl's fruits")
     parser.add_argument("--repeats", type=count, default=7, help="of a window")
     parser.add_argument("--device", help="cpu, cuda:0, ...")
-    parser.add_argument("--out", metavar="FILE", help="write all figures there as JSON")
     args = parser.parse_args()
     known = cases(True, args.fraction)
-    chosen = args.cases or [*cases(args.large, args.fraction), START]
+    chosen = args.cases or [*cases(args.large, args.fraction), *OTHERS]
     timed = {name: case for name, case in known.items() if name in chosen}
+    print(machine.line(args.device), "", sep="\n", flush=True)
     found: dict[str, float] = {}
     run = partial(figures, frames=args.frames, repeats=args.repeats, device=args.device)
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, spawn, max_tasks_per_child=1) as pool:
         for name, new in zip(timed, pool.map(run, timed.values()), strict=True):
             found |= show(f"{name}.", new)
-    found |= show("", summary(found, timed))
-    if START in chosen:
-        found |= show(f"{START}.", start_times(args.device))
-    if args.out:
-        report.write(args.out, [Figure("", *figure) for figure in found.items()], args.device)
+    show("", summary(found, timed))
+    for name in (n for n in OTHERS if n in chosen):
+        show(f"{name}.", OTHERS[name](args.device))
     return 0
 
 
 def show(case: str, new: dict[str, float]) -> dict[str, float]:
-    """Print the figures of a case but for those of operations; all of them, by their full names."""
+    """Print the figures of a case; they, by their full names."""
     found = {case + name: value for name, value in new.items()}
     for name, value in found.items():
-        if name.count(".") < 3:
-            print(f"{name} {value:.5g}", flush=True)
+        print(f"{name} {value:.5g}", flush=True)
     return found
 
 
 def summary(found: dict[str, float], timed: dict[str, Case]) -> dict[str, float]:
-    """The launch overhead, and the exponents of the time of a step over the vertices."""
+    """The exponents of the time of a step over the vertices, and what pairs that touch cost."""
     new = {}
-    if OVERHEAD in timed:
-        new["launch_overhead_us"] = found[f"{OVERHEAD}.step.overhead_us_per_launch"]
     for series in sorted({case.series for case in timed.values()} - {""}):
         names = [name for name, case in timed.items() if case.series == series]
         if len(names) > 1:
-            of = ([found[f"{n}.{f}"] for n in names] for f in ("vertices", "step.ms"))
-            new[f"{series}.slope"] = log_slope(*of)
+            of = (np.log([found[f"{n}.{f}"] for n in names]) for f in ("vertices", "step.ms"))
+            new[f"{series}.slope"] = np.polyfit(*of, 1)[0]
+    pairs = [f"pairs_{n}.step" for n in PAIRS]
+    if all(f"{name}.ms" in found for name in pairs):
+        apart, *added = (found[f"{name}.ms"] - found[f"{name}.elastic_ms"] for name in pairs)
+        each, fixed = np.polyfit(PAIRS[1:], np.array(added) - apart, 1)
+        new |= {"pairs.any_ms": fixed, "pairs.each_ms": each}
     return new
 
 

@@ -1,6 +1,6 @@
 """Draw error against wall time, for this package and for engines outside.
 
-    python tools/pareto.py [task ...] [--quick] [--out DIR] [--python PATH] [--repeats N]
+    python tools/pareto.py [task ...] [--out DIR] [--python PATH] [--repeats N]
     python tools/pareto.py --draw FILE
 
 Every method simulates the same vertices, tets and masses at the same frame rate on the CPU, is
@@ -26,10 +26,8 @@ from engines.task import Failed, Motion, Task
 from measure import machine
 from measure.run import command_line, count, one_of
 
-TASKS = *closed_forms.TASKS, *scenes.TITLES
-LIMIT, QUICK_LIMIT = 12.0, 6.0  # wall seconds of one run
-REPEATS = 3  # of everything, in turn; times are medians
-FEW = 5  # settings of each engine outside in the quick run
+TASKS = closed_forms.TASKS | {name: scenes.scene(name) for name in scenes.TITLES}
+LIMIT = 12.0  # wall seconds of one run
 HEAD = """Error against wall time, {} run(s) of each, {:.0f} s in all.
 {}; outside: {}.
 Kernels are compiled and the first frame is stepped before the clock starts. Failures are behind \
@@ -40,25 +38,21 @@ def main() -> int:
     """Run, draw, write."""
     parser = command_line(__doc__)
     parser.add_argument("tasks", nargs="*", type=one_of(TASKS), metavar="task", help="or all")
-    parser.add_argument("--quick", action="store_true", help="fewer settings, each once, short")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "pareto")
     parser.add_argument("--python", default=sys.executable, help="interpreter with the engines")
-    parser.add_argument("--repeats", type=count, help=f"{REPEATS}, quick: 1")
+    parser.add_argument("--repeats", type=count, default=3, help="of all; times are medians")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="a table to draw again")
     args = parser.parse_args()
-    tasks = closed_forms.TASKS | {n: scenes.scene(n, args.quick) for n in scenes.TITLES}
-    chosen = [tasks[name] for name in args.tasks or TASKS]
+    chosen = [TASKS[name] for name in args.tasks or TASKS]
     titles = {panel.name: panel.title for _, panels in chosen for panel in panels}
     if args.draw:
         draw(args.draw.parent, titles, shown(points.read(args.draw)))
         return 0
-    own, few, limit = (ours.QUICK, FEW, QUICK_LIMIT) if args.quick else (ours.ALL, None, LIMIT)
-    others = {engine: settings[:few] for engine, settings in SWEEPS.items()}
     begin, rounds, outside = perf_counter(), [], versions(args.python)
-    for _ in range(args.repeats or (1 if args.quick else REPEATS)):
+    for _ in range(args.repeats):
         rounds.append([])
         for task, panels in chosen:
-            for run in runs(task, own, others, args.python, limit):
+            for run in runs(task, ours.ALL, SWEEPS, args.python, LIMIT):
                 rounds[-1] += judge(task, panels, *run)
         # After every round: a long run leaves what it has.
         found = [middle(same) for same in zip(*rounds, strict=True)]

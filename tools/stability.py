@@ -23,7 +23,7 @@ FAMILIES = {
     "limits": limits.cases,  # B10 what the method was not made for
     "speed": loads.speed,  # B9 speed and tunnelling
     "ratios": loads.ratios,  # B3 mass and stiffness ratios
-    "figures": figures.cases,  # B4 to B7 the scenes of the paper
+    "figures": figures.cases,  # B4, B6, B7 the scenes of the paper
     "primitives": shapes.primitives,  # B2 primitive pairs
     "tilts": figures.tilts,  # B2 blocks at random tilts
     "spikes": shapes.spikes,  # B1 spikes, wedges, edges, holes

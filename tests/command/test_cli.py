@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -248,3 +249,9 @@ def test_progress_is_silent_without_a_terminal_or_when_quiet(stream):
 
 def test_clock():
     assert [clock(s) for s in (4.4, 61, 3600 + 125)] == ["0:04", "1:01", "1:02:05"]
+
+
+def test_the_installed_command_is_there_and_starts(capsys):
+    (found,) = entry_points(group="console_scripts", name="warp-contact")
+    assert found.load()(["scenes"]) == 0
+    assert "bowl" in capsys.readouterr().out

@@ -15,6 +15,7 @@ RUBBER = NeoHookean(1e5, 0.3, 1000.0)
         ({"friction": -0.1}, "friction -0.1 is negative"),
         ({"friction": float("nan")}, "friction nan is not finite"),
         ({"gravity": (0.0, 1.0)}, "gravity .* is not finite or not of shape"),
+        ({"gravity": (0.0, 0.0, np.nan)}, "gravity .* is not finite or not of shape"),
         ({"gravity": "down"}, "gravity 'down' is not a number"),
     ],
 )
@@ -34,6 +35,7 @@ def test_a_scene_refuses_what_is_no_physics(options, message):
         ({"label": "plane0"}, "body 'plane0': this is how a half-space is called"),
         ({"rotation": (0, 0, 0, 0)}, "body 'cube': rotation is a zero quaternion"),
         ({"position": (0, 0, np.nan)}, "body 'cube': position .* is not finite"),
+        ({"velocity": (0, 0, np.nan)}, "body 'cube': velocity .* is not finite"),
         ({"velocity": np.zeros((7, 3))}, r"body 'cube': velocity [\s\S]* not of shape"),
         ({"world": -1}, "body 'cube': world -1 is not a count"),
         ({"world": None}, "body 'cube': world None is not a count"),

@@ -6,11 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 HEAD = "panel", "method", "setting", "wall s per simulated s", "error", "outcome", "start-up s"
-BY_WALL, BY_ERROR = attrgetter("wall"), attrgetter("error")
-COMPARED = (  # times of all methods at equal errors, errors at equal times
-    ("error at most {:g}", (0.05, 0.01, 0.001), BY_ERROR, BY_WALL, "{p.method} {p.wall:.3g} s"),
-    ("within {:g} s per s", (1.0, 10.0), BY_WALL, BY_ERROR, "{p.method} {p.error:.2g}"),
-)
+BY_ERROR = attrgetter("error")
 
 
 class Point(NamedTuple):
@@ -52,7 +48,9 @@ def dominates(a: Point, b: Point) -> bool:
 def front(points: list[Point]) -> list[Point]:
     """The points that none dominates, the fastest first; failures are never among them."""
     fine = [p for p in points if p.error is not None]
-    return sorted((p for p in fine if not any(dominates(q, p) for q in fine)), key=BY_WALL)
+    return sorted(
+        (p for p in fine if not any(dominates(q, p) for q in fine)), key=attrgetter("wall")
+    )
 
 
 def report(head: str, titles: dict[str, str], points: list[Point]) -> str:
@@ -65,25 +63,19 @@ def report(head: str, titles: dict[str, str], points: list[Point]) -> str:
 
 
 def panel(points: list[Point]) -> list[str]:
-    """Who is on the front, behind it, before the default; times at equal error; failures."""
+    """Who is on the front, behind it, before the default; failures."""
     of = {p.method: [q for q in points if q.method == p.method] for p in points}
-    fine = {method: [p for p in mine if p.error is not None] for method, mine in of.items()}
     ahead = front(points)
     lines = [f"  front: {_show(p)}" for p in ahead] or ["  front: empty, every run failed"]
-    for method, mine in fine.items():
-        if mine and method not in {p.method for p in ahead}:
-            lines.append(f"  behind the front: {_show(min(mine, key=BY_ERROR))} is its best")
+    for method, mine in of.items():
+        fine = [p for p in mine if p.error is not None]
+        if fine and method not in {p.method for p in ahead}:
+            lines.append(f"  behind the front: {_show(min(fine, key=BY_ERROR))} is its best")
     own = front(of.get("default", []))
     if own:
         before = [m for m in of if any(dominates(p, q) for p in of[m] for q in own)]
         said = ", ".join(before) or "none"
         lines.append(f"  faster and no less accurate than a point of the default's front: {said}")
-    for head, limits, limited, best, cell in COMPARED:
-        for limit in limits:
-            within = [[p for p in mine if limited(p) <= limit] for mine in fine.values()]
-            first = sorted((min(w, key=best) for w in within if w), key=best)
-            said = ", ".join(cell.format(p=p) for p in first) or "none"
-            lines.append(f"  {head.format(limit)}: {said}")
     for method, mine in of.items():
         why = [p.outcome for p in mine if p.error is None]
         if why:

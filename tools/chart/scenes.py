@@ -24,7 +24,7 @@ from chart.panel import Panel, late, sound
 from warp_contact import scenes
 
 FPS = 60
-DURATION, QUICK = 1.0, 0.5  # [s]
+FRAMES = 60
 CONVERGED = 16  # times the steps
 LATE = 0.25  # part of the frames at the end in which the bodies of a pair touch
 TUNNELLED = 1.0  # of an edge: an overlap or gap from which a body is on the wrong side
@@ -37,11 +37,10 @@ PRESSED = [("lower_cube", "sphere"), ("sphere", "upper_cube")]
 PRESSED += [("membrane", f"cube_{mass}") for mass in (1, 4, 16)]
 
 
-def scene(name: str, quick: bool) -> tuple[Task, list[Panel]]:
+def scene(name: str) -> tuple[Task, list[Panel]]:
     """A scene of the paper: overlap and gap, its overlap alone, its motion."""
     module, title = scenes.load(name), TITLES[name] + "\n{} [of an edge]"
-    frames = round((QUICK if quick else DURATION) * FPS)
-    return Task(module.build, FPS, frames, **module.PENALTY), [
+    return Task(module.build, FPS, FRAMES, **module.PENALTY), [
         Panel(name, title.format("overlap or gap"), apart),
         Panel(f"{name} overlap", title.format("overlap alone"), inside),
         Panel(f"{name} motion", title.format("distance from a converged run"), astray),

@@ -1,4 +1,4 @@
-"""The figures of one case, and of a start, by name; what they are: ``tools/bench.py``."""
+"""The figures of a case, of sleep and of a start by name; what they are: ``tools/bench.py``."""
 
 import os
 import resource
@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 import warp_contact as wc
-from clock.scenes import Case
+from clock.scenes import Case, blocks
 from clock.window import Timing, measure
 
 START = """
@@ -26,6 +26,7 @@ wc.Simulation(squeezed_sphere.build(), device={!r}).step_frame()
 print(imported - begin, perf_counter() - imported)
 """
 STARTS = 3  # with kernels that are compiled already
+SETTLING, REST, LONG, SAMPLE = 20, 40, 900, 20  # frames of the blocks that fall asleep
 SHOWN_FRAMES = 3  # of which the median gives the frames per second
 BOUND = 90.0, 150.0, 1000.0  # ns that a tet, a surface vertex, a contact with its sweeps may take
 
@@ -33,7 +34,7 @@ BOUND = 90.0, 150.0, 1000.0  # ns that a tet, a surface vertex, a contact with i
 def figures(case: Case, frames: int | None, repeats: int, device: str | None) -> dict[str, float]:
     """Run a case until there are contacts, then time it."""
     wp.config.log_level = wp.LOG_WARNING
-    sim = wc.Simulation(case.build(), device=device)
+    sim = wc.Simulation(case.build(), substeps=case.substeps, device=device)
     frame_times(sim, case.frames if frames is None else frames)
     timing, model, spectrum = measure(sim, repeats), sim.model, sim._stepper.spectrum
     choice, rates = [], spectrum.rates
@@ -63,32 +64,26 @@ def figures(case: Case, frames: int | None, repeats: int, device: str | None) ->
 
 
 def step_figures(timing: Timing, model) -> dict[str, float]:
-    """The whole step, then each stage, then each operation."""
-    whole, step = timing.whole, timing.step_ms
-    sizes = {"tet": model.n_tet, "surface_vertex": model.n_surf, "contact": timing.contacts}
-    bound = sum(ns * n for ns, n in zip(BOUND, sizes.values(), strict=True))
-    overhead = 1e3 * (step - whole.ms)
+    """The whole step, then each stage."""
+    step, costs = timing.step_ms, timing.stages.values()
+    launches, operations = (sum(of) for of in zip(*costs, strict=True))
+    overhead = 1e3 * (step - operations)
+    sizes = model.n_tet, model.n_surf, timing.contacts
+    bound = sum(ns * n for ns, n in zip(BOUND, sizes, strict=True))
     found = {
         "contacts": timing.contacts,
-        "array_bytes": timing.bytes,
-        "step.launches": whole.launches,
+        "step.launches": launches,
         "step.ms": step,
         "step.ns_per_vertex": 1e6 * step / model.n_vert,
         "step.elastic_ms": timing.elastic_ms,
-        "step.operations_ms": whole.ms,
-        "step.overhead_us_per_launch": overhead / whole.launches,
+        "step.operations_ms": operations,
+        "step.overhead_us_per_launch": overhead / launches,
         "step.overhead_us": overhead,
         "step.of_bound": 1e6 * step / bound,
-        "step.bytes": whole.bytes,
     }
     for stage, cost in timing.stages.items():
         found |= {f"{stage}.{name}": value for name, value in cost._asdict().items()}
-        found[f"{stage}.share"] = cost.ms / (whole.ms or 1.0)  # a clock may be too coarse
-        each = {f"{stage}.ns_per_{thing}": 1e6 * cost.ms / n for thing, n in sizes.items() if n}
-        found |= each
-    for (stage, name), cost in timing.kernels.items():
-        found[f"{stage}.{name}.launches"] = cost.launches
-        found[f"{stage}.{name}.ms"] = cost.ms
+        found[f"{stage}.share"] = cost.ms / (operations or 1.0)  # a clock may be too coarse
     return found
 
 
@@ -101,6 +96,22 @@ def frame_times(sim: wc.Simulation, frames: int) -> list[float]:
         wp.synchronize_device(sim.device)
         times.append(perf_counter() - start)
     return times
+
+
+def sleep_figures(device: str | None) -> dict[str, float]:
+    """What a frame of blocks costs settling, at rest and asleep, and what sleep changes."""
+    awake, asleep = (wc.Simulation(blocks(), sleeping=s, device=device) for s in (False, True))
+    settling = frame_times(awake, SETTLING)
+    while asleep.frame < REST or (asleep.state.v.numpy().any() and asleep.frame < LONG):
+        asleep.step_frame()
+    while awake.frame < asleep.frame:
+        awake.step_frame()
+    until = float(asleep.frame)
+    times = settling, frame_times(awake, SAMPLE), frame_times(asleep, SAMPLE)
+    names = "settling_ms", "at_rest_ms", "asleep_ms"
+    found = {name: 1e3 * median(t) for name, t in zip(names, times, strict=True)}
+    apart = np.abs(awake.positions() - asleep.positions()).max() / awake.model.body_edge.numpy()[0]
+    return found | {"frames_until_all_sleep": until, "moved": float(apart)}
 
 
 def start_times(device: str | None) -> dict[str, float]:
@@ -118,8 +129,3 @@ def start_times(device: str | None) -> dict[str, float]:
     imports, frames = zip(*starts[1:], strict=True)
     first = {"import_s": median(imports), "warm_frame_s": median(frames)}
     return first | {"cold_frame_s": starts[0][1]}
-
-
-def log_slope(x, y) -> float:
-    """Exponent p of the fit y ~ x^p."""
-    return float(np.polyfit(np.log(x), np.log(y), 1)[0])

@@ -1,7 +1,4 @@
-"""What is timed: six scenes, piles of more and more spheres, more and more worlds, mesh orders.
-
-``ROWS`` are those of ``tools/economy.py``: the same 64 spheres in ever more contact.
-"""
+"""What is timed: six scenes, piles of more and more spheres, worlds, mesh orders, few contacts."""
 
 import math
 from collections.abc import Callable
@@ -36,7 +33,8 @@ BALL, RADIUS = 41, 0.05  # vertices of a sphere, and its radius [m]
 LAYERS = 4  # of a pile
 RUBBER = wc.NeoHookean(2e4, 0.35, 1000.0, 1e-3)
 
-COUNT, SIDE = 64, 8  # spheres of the rows, and along a side where they lie by themselves
+COUNT = 64  # spheres of which some touch
+PAIRS = 0, 1, 4, 16, 64  # that touch
 SPEED = 0.3  # of each sphere, at random or toward the middle of its square [m/s]
 APART = 3.0  # between spheres that do not touch, in diameters
 SEED = 3
@@ -45,10 +43,10 @@ SEED = 3
 class Case(NamedTuple):
     """One scene to time."""
 
-    build: Callable[..., wc.Scene]  # those of the rows take the coefficient of friction
+    build: Callable[..., wc.Scene]
     frames: int  # to run before
     series: str = ""  # those of the same name are compared by their number of vertices
-    pairs: int | None = None  # that touch, None where they were not counted
+    substeps: int | None = None  # of a frame; None leaves them to the simulation
 
 
 def cases(large: bool, fraction: float) -> dict[str, Case]:
@@ -59,6 +57,7 @@ def cases(large: bool, fraction: float) -> dict[str, Case]:
         found[f"pile_{n}"] = Case(partial(pile, n), SERIES_FRAMES, "pile")
     for n in WORLDS + (LARGE_WORLDS,) * large:
         found[f"worlds_{n}"] = Case(partial(copies, n), SERIES_FRAMES, "worlds")
+    found |= {f"pairs_{n}": Case(partial(squares, n), 1, substeps=20) for n in PAIRS}
     return found | {f"block_{order}": Case(partial(block, order), 1) for order in ORDERS}
 
 
@@ -100,7 +99,7 @@ def block(order: str) -> wc.Scene:
     return scene(body(mesh, RUBBER), friction=0.0)
 
 
-def squares(pairs: int, friction: float) -> wc.Scene:
+def squares(pairs: int) -> wc.Scene:
     """Without gravity, squares of four, the first of them closed until so many pairs touch."""
     mesh, size, _ = ball()
     rng, bodies = np.random.default_rng(SEED), []
@@ -113,37 +112,7 @@ def squares(pairs: int, friction: float) -> wc.Scene:
         origin = 3.0 * APART * np.array([square % 4, square // 4, 0.0])
         place = size * (origin + (1.0 if touching else APART) * at)
         bodies.append(body(mesh, RUBBER, place, v=v))
-    return scene(*bodies, gravity=NONE, friction=friction)
-
-
-def spread(floor: str, friction: float) -> wc.Scene:
-    """Each sphere on the floor by itself."""
-    mesh, size, depth = ball()
-    bodies = []
-    for k in range(COUNT):
-        x, y = APART * size[:2] * (np.array(divmod(k, SIDE)) - 0.5 * (SIDE - 1))
-        bodies.append(body(mesh, RUBBER, (x, y, depth)))
-    return on(floor, APART * SIDE * size[0], bodies, friction)
-
-
-def heaped(floor: str, friction: float) -> wc.Scene:
-    """A pile of all spheres that collapses."""
-    heap = pile(COUNT * BALL).bodies
-    middle = np.mean([b.x.mean(axis=0) for b in heap], axis=0) * (1.0, 1.0, 0.0)
-    bodies = []
-    for b in heap:
-        place = b.x.mean(axis=0) - b.mesh.vertices.mean(axis=0)
-        bodies.append(body(b.mesh, RUBBER, place - middle))
-    return on(floor, 1.5, bodies, friction)
-
-
-def on(floor: str, width: float, bodies: list[dict], friction: float) -> wc.Scene:
-    """Bodies on z = 0, a plane, or a mesh of this width [m] that does not move."""
-    if floor == "plane":
-        return scene(*bodies, planes=[UP], friction=friction)
-    cells = round(width / 0.1)
-    slab = wc.box((width, width, 0.1), (cells, cells, 1))
-    return scene(body(slab, RUBBER, -0.05, fixed=True), *bodies, friction=friction)
+    return scene(*bodies, gravity=NONE)
 
 
 def blocks() -> wc.Scene:
@@ -151,13 +120,3 @@ def blocks() -> wc.Scene:
     mesh, material = wc.box(0.1, 2), wc.NeoHookean(3e4, 0.3, 1000.0, damping=1e-2)
     places = [(0.2 * k, 0.0, z) for k in range(16) for z in (0.051, 0.153)]
     return scene(*(body(mesh, material, at) for at in places), planes=[UP])
-
-
-ROWS = {  # of the table of ``tools/economy.py``: run until pairs touch, spheres lie, a pile does
-    "apart": Case(partial(squares, 0), 1, pairs=0),
-    **{f"{n} pairs": Case(partial(squares, n), 1, pairs=n) for n in (1, 4, 16, 64)},
-    "on a plane": Case(partial(spread, "plane"), 20),
-    "on a mesh": Case(partial(spread, "mesh"), 20),
-    "pile on a plane": Case(partial(heaped, "plane"), 40),
-    "pile on a mesh": Case(partial(heaped, "mesh"), 40),
-}

@@ -11,7 +11,6 @@ from contextlib import ExitStack
 from dataclasses import fields, is_dataclass
 from time import perf_counter, thread_time
 from traceback import walk_stack
-from typing import NamedTuple
 from unittest import mock
 
 import warp as wp
@@ -28,22 +27,16 @@ MEMORY = {  # with the same where there is next to nothing to do
 }
 
 
-class Operation(NamedTuple):
-    """One operation."""
-
-    stage: str  # a module of ``warp_contact/step``, or ``OTHER``
-    name: str  # of the kernel or memory operation
-    bytes: int  # of the arrays that it was given, what several of them share once
-    ms: float
-
-
 class StageTimer(ExitStack):
-    """Keeps a record of every operation while it is entered, in order, as ``operations``."""
+    """Keeps stage and time [ms] of every operation while it is entered, as ``operations``.
+
+    The stage is a module of ``warp_contact/step``, or ``OTHER``.
+    """
 
     def __init__(self, device: wp.Device):
         """``device`` is that of the step."""
         super().__init__()
-        self.operations: list[Operation] = []
+        self.operations: list[tuple[str, float]] = []
         self._device, self._inside = device, False
         one, other = (wp.zeros(1, dtype=int, device=device) for _ in range(2))
         tree = wp.Bvh(*(wp.zeros(1, dtype=wp.vec3, device=device) for _ in range(2)))
@@ -53,7 +46,7 @@ class StageTimer(ExitStack):
         """Put the timer between the step and Warp."""
         timed = {(wp, "launch"): self._launch(wp.launch)}
         for (owner, name), small in MEMORY.items():
-            timed[owner, name] = self._operation(name, getattr(owner, name), small)
+            timed[owner, name] = self._operation(getattr(owner, name), small)
         for place, function in timed.items():
             self.enter_context(mock.patch.object(*place, function))
         return self
@@ -68,12 +61,11 @@ class StageTimer(ExitStack):
             command.launch()
             empty = milliseconds(self._device, command.launch)
             command.params[0] = bounds
-            given = *kwargs.get("inputs", ()), *kwargs.get("outputs", ())
-            self._note(kernel.key, given, milliseconds(self._device, command.launch) - empty)
+            self._note(milliseconds(self._device, command.launch) - empty)
 
         return call
 
-    def _operation(self, name: str, function, small):
+    def _operation(self, function, small):
         def call(*args, **kwargs):
             if self._inside:  # one operation may be made of others
                 return function(*args, **kwargs)
@@ -82,12 +74,12 @@ class StageTimer(ExitStack):
             empty = milliseconds(self._device, small, *self._few)
             ms = milliseconds(self._device, function, *args, **kwargs)
             self._inside = False
-            self._note(name, args, ms - empty)
+            self._note(ms - empty)
 
         return call
 
-    def _note(self, name: str, given: tuple, ms: float) -> None:
-        self.operations.append(Operation(_stage(), name, held(given), ms))
+    def _note(self, ms: float) -> None:
+        self.operations.append((_stage(), ms))
 
 
 def milliseconds(device: wp.Device, function, *args, **kwargs) -> float:

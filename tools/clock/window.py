@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import warp as wp
 
-from clock.timer import Operation, StageTimer, arrays, held, milliseconds
+from clock.timer import StageTimer, arrays, held, milliseconds
 from warp_contact import Simulation
 from warp_contact.frame.damping import share_for, stages_for
 from warp_contact.step.loop import step_of
@@ -18,15 +18,10 @@ ATTEMPTS = 4  # at a window whose contacts fit into the buffers
 
 
 class Cost(NamedTuple):
-    """What some operations cost in a step: their number, their time, the bytes given to them."""
+    """What the operations of a stage cost in a step: their number and their time."""
 
-    launches: float = 0.0
-    ms: float = 0.0
-    bytes: float = 0.0
-
-    def __add__(self, other: "Cost") -> "Cost":
-        """The sum of both."""
-        return Cost(*(a + b for a, b in zip(self, other, strict=True)))
+    launches: float
+    ms: float
 
 
 class Timing(NamedTuple):
@@ -37,20 +32,7 @@ class Timing(NamedTuple):
     elastic_ms: float  # of a captured step without contact: predict, damping and drift
     contacts: float  # at the end of a step, mean over the window
     bytes: int  # in the arrays of model, state and work
-    kernels: dict[tuple[str, str], Cost]  # of each kernel or memory operation, by stage and name
-
-    @property
-    def stages(self) -> dict[str, Cost]:
-        """Cost of each stage."""
-        found = defaultdict(Cost)
-        for (stage, _), cost in self.kernels.items():
-            found[stage] += cost
-        return {k: c._replace(ms=max(0.0, c.ms)) for k, c in found.items()}
-
-    @property
-    def whole(self) -> Cost:
-        """Cost of all operations."""
-        return sum(self.stages.values(), Cost())
+    stages: dict[str, Cost]
 
 
 def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
@@ -67,15 +49,15 @@ def measure(sim: Simulation, repeats: int, steps: int | None = None) -> Timing:
             runs.append((window.replay(step), window.replay(elastic), window.operations()))
         window.restore()
     whole, without, operations = zip(*runs, strict=True)
-    kernels = defaultdict(Cost)
+    times = defaultdict(list)
     for same in zip(*operations, strict=True):  # repeats do the same in the same order
-        ms = median(o.ms for o in same)
-        kernels[same[0][:2]] += Cost(1.0 / steps, ms / steps, same[0].bytes / steps)
+        times[same[0][0]].append(median(ms for _, ms in same))
+    stages = {k: Cost(len(ms) / steps, max(0.0, sum(ms)) / steps) for k, ms in times.items()}
     step_ms, elastic_ms = (
-        sum(median(times) for times in zip(*of, strict=True)) / steps for of in (whole, without)
+        sum(median(same) for same in zip(*of, strict=True)) / steps for of in (whole, without)
     )
     everything = held(sim.model, sim.state, sim._stepper.work)
-    return Timing(steps, step_ms, elastic_ms, mean(window.contacts), everything, dict(kernels))
+    return Timing(steps, step_ms, elastic_ms, mean(window.contacts), everything, stages)
 
 
 def _elastic(model, state, work, stages: int) -> None:
@@ -128,8 +110,8 @@ class _Window:
         launch = wp.capture_launch
         return [milliseconds(self._device, launch, graph) for _ in range(self._steps)]
 
-    def operations(self) -> list[Operation]:
-        """Every operation of the window, in order."""
+    def operations(self) -> list[tuple[str, float]]:
+        """Stage and time [ms] of every operation of the window, in order."""
         self.restore()
         self.contacts.clear()
         with StageTimer(self._device) as timer:

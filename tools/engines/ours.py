@@ -37,15 +37,12 @@ class Own(NamedTuple):
 
 DEFAULT = Own("default", 4)
 STIFFNESSES = 0.01, 0.1, 1.0, 10.0, 100.0  # of that of the task
-QUICK = [
+ALL = [
     *(DEFAULT._replace(factor=f) for f in (1, 2, 4)),
     *(Own("default", n) for n in (2, 8)),
     *(Own(name, factor=f) for name in ("impulses alone", "predicted") for f in (1, 2, 4)),
     *(Own("literal", n) for n in (4, 8, 16)),
     *(Own("penalty", times=k) for k in STIFFNESSES),
-]
-ALL = [
-    *QUICK,
     *(Own("default", n, factor=f) for n in (2, 8, 16) for f in (2, 4)),
     *(Own("literal", n, factor=f) for n in (4, 8, 16) for f in (2, 4)),
     *(Own("penalty", times=k, factor=2) for k in STIFFNESSES),

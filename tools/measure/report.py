@@ -1,10 +1,5 @@
-"""The table on the screen, a line for each figure, and the file of all of them."""
+"""The table on the screen, a line for each figure."""
 
-import json
-from collections.abc import Iterable
-from pathlib import Path
-
-from measure import machine
 from measure.figure import Figure
 
 
@@ -35,10 +30,3 @@ def line(f: Figure) -> str:
     targets = ("{:.4g}", f.reference), (">= {:.4g}", f.least), ("<= {:.4g}", f.most)
     target = " ".join(form.format(x) for form, x in targets if x is not None)
     return FIGURES.line(f.case, f.name, value, target, error, f.level, f.note)
-
-
-def write(path: str | Path, figures: Iterable[Figure], device=None) -> None:
-    """Write the machine and the values by ``case.name`` as JSON."""
-    values = {f"{f.case}.{f.name}".lstrip("."): f.value for f in figures}
-    text = json.dumps(machine.about(device) | {"figures": values}, indent=1)
-    Path(path).write_text(text + "\n", encoding="utf-8")

@@ -1,11 +1,11 @@
-"""B11: input on the border of what has a meaning: it runs, or is refused before the first step."""
+"""B11: input on the border of what the method can do; what has no meaning: tests/scene."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 import warp_contact as wc
-from trials.outcome import BEYOND, FINE, REFUSED
+from trials.outcome import BEYOND, FINE
 from trials.pieces import UPSIDE_DOWN, tip
 from trials.setting import DOWN, NONE, UP, Case, Setting, body, case, setting, soft
 
@@ -13,7 +13,7 @@ EDGE = 0.1  # [m]
 
 
 def cases() -> Iterator[Case]:
-    """What has to run, then what has to be refused."""
+    """What runs; where it is beyond the method, a refusal says why."""
     for name, aside in (("aligned", 0.0), ("shifted by half a cell", 0.25 * EDGE)):
         for gap in (0.0, -1e-12, -1e-6, 1e-6):
             yield case(f"B11 faces {name}, gap {gap:g}", pair, gap=gap, aside=aside)
@@ -24,7 +24,6 @@ def cases() -> Iterator[Case]:
     yield case("B11 equal bodies in one place", pair, gap=-EDGE, expect=BEYOND)
     yield case("B11 sliver tet of aspect 1000", sliver, 1e3)
     yield case("B11 sliver tet of aspect 1e+06", sliver, 1e6, expect=BEYOND)
-    yield case("B11 inverted tets at the start", pulled_through)
     for far in (1e1, 1e2, 1e3, 1e5, 1e7):
         expect = FINE if far < 2e3 else BEYOND
         yield case(f"B11 {far:g} m from the origin", pair, far=far, expect=expect)
@@ -40,40 +39,6 @@ def cases() -> Iterator[Case]:
         yield case(f"B11 friction {friction:g}", pair, friction=friction)
     yield case("B11 gravity 0, at rest", pair, v=0.0, gravity=NONE)
     yield case("B11 all vertices fixed", pair, v=0.0, fixed=True)
-    yield from refusals()
-
-
-def refusals() -> Iterator[Case]:
-    """What has to be refused, with a word on what is wrong where."""
-    x, tets = wc.box(EDGE, 1).vertices, wc.box(EDGE, 1).tets
-    eight, fine = np.arange(8)[:, None], wc.box(EDGE, 2)
-    middle = np.abs(fine.vertices).max(axis=1, keepdims=True) < 1e-9
-    meshes = {
-        "NaN in a vertex": (np.where(eight == 3, np.nan, x), tets),
-        "duplicate vertices, a flat tet": (np.where(eight == 7, x[6], x), tets),
-        "zero-area triangles": (x * [1.0, 1.0, 0.0], tets),
-        "a vertex of no tet": (np.concatenate([x, [[1.0, 1.0, 1.0]]]), tets),
-        "a tet that repeats a vertex": (x, np.concatenate([tets, [[0, 1, 1, 2]]])),
-        "a tet twice": (x, np.concatenate([tets, tets[:1]])),
-        "an index out of range": (x, np.concatenate([tets, [[0, 1, 2, 99]]])),
-        "no tets": (x, tets[:0]),
-        "inverted tets in the rest shape": (fine.vertices + middle * [0.0, 0.0, EDGE], fine.tets),
-        "a tet of aspect 1e8": (tip().vertices * [1.0, 1.0, 1e-8], [[0, 1, 2, 3]]),
-    }
-    for name, mesh in meshes.items():
-        yield case(f"B11 {name}", alone, mesh, expect=REFUSED)
-    yield case("B11 no bodies", setting, seconds=0.1, expect=REFUSED)
-    given = {
-        "fps 0": {"fps": 0.0},
-        "fps infinite: a step of 0": {"fps": np.inf},
-        "NaN in a velocity": {"v": np.nan},
-        "NaN in gravity": {"gravity": (0.0, 0.0, np.nan)},
-        "Poisson ratio 0.5": {"poisson": 0.5},
-        "density 0": {"density": 0.0},
-        "E 0": {"young": 0.0},
-    }
-    for name, argument in given.items():
-        yield case(f"B11 {name}", pair, **argument, expect=REFUSED)
 
 
 def pair(
@@ -85,7 +50,6 @@ def pair(
     gravity=DOWN,
     friction: float = 0.3,
     fixed: bool | str = "base",
-    fps: float | None = None,
     **material,
 ) -> Setting:
     """A cube comes down on one that is held; lengths, speed and time scale together."""
@@ -95,10 +59,8 @@ def pair(
     low = body(wc.box(scale * EDGE, 2), rubber, at, fixed=fixed, label="low")
     held = True if fixed is True else None
     high = body(wc.box(scale * EDGE, 2), rubber, place, v=-v, fixed=held, label="high")
-    period = scale
-    if rubber.youngs_modulus > 0.0 and rubber.density > 0.0:
-        period *= 2.0 * EDGE * np.sqrt(rubber.density / rubber.youngs_modulus)
-    run = {"seconds": 8.0 * period, "fps": 5.0 / period if fps is None else fps}
+    period = scale * 2.0 * EDGE * np.sqrt(rubber.density / rubber.youngs_modulus)
+    run = {"seconds": 8.0 * period, "fps": 5.0 / period}
     return setting(low, high, gravity=np.array(gravity) / scale, friction=friction, **run)
 
 
@@ -113,21 +75,3 @@ def sliver(aspect: float) -> Setting:
     """A flat tet falls on the ground; its step is as short as it is thin."""
     flat = body(tip(EDGE).scaled(1.0, 1.0, 1.0 / aspect), at=2.0 * EDGE / aspect)
     return setting(flat, planes=[UP], seconds=20.0 * EDGE / aspect, fps=100.0 * aspect)
-
-
-def pulled_through() -> Setting:
-    """A cube with some tets inside out: before the first step a corner moves through its middle."""
-
-    def drive(sim: wc.Simulation) -> None:
-        if sim.frame == 0:
-            x = sim.positions(0)
-            x[0] *= -0.6
-            sim.state.x.assign(x)
-
-    cube = body(wc.box(EDGE, 2), wc.NeoHookean(1e5, 0.4, 1000.0, 1e-3))
-    return setting(cube, gravity=NONE, seconds=0.2, drive=drive)
-
-
-def alone(mesh) -> Setting:
-    """A body of these vertices and tets."""
-    return setting(body(wc.TetMesh(*mesh)), seconds=0.1)

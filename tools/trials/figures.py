@@ -1,4 +1,4 @@
-"""The scenes of the paper as they are, the sphere squeezed further; blocks that no one chose.
+"""The scenes of the paper as they are; blocks that no one chose.
 
 ``tilts`` are the collisions of ``verification/collision.py``, with rotation, place, cells and
 stiffness drawn anew for each number. Corners slide over facets that they bend, and pass each other
@@ -10,13 +10,10 @@ from collections.abc import Iterator
 import numpy as np
 from verification import collision
 
-import warp_contact as wc
 from trials.setting import Case, Setting, case
 from warp_contact import scenes
 
 FPS = 60.0
-SPEED = 0.1  # of the upper cube [m/s]
-REST = 0.2  # between squeeze and release [s]
 PAIRED = {"pairs": ((0, 1), (2, 3))}  # bodies side by side
 
 DRAWS = 180
@@ -25,11 +22,9 @@ ASIDE = 0.03  # the largest shift along x and y [m]
 
 
 def cases() -> Iterator[Case]:
-    """B4 to B7."""
+    """B4, B6, B7."""
     on_sheet = {"pairs": ((0, 1), (0, 2), (0, 3))}
     yield case("B4 three cubes on a membrane", paper, "cubes_on_membrane", 2.0, on_sheet)
-    for part in (0.7, 0.5, 0.3, 0.15):
-        yield case(f"B5 sphere squeezed to {part:.0%} and released", squeezed, part)
     for mu in (0.3, 0.0):
         name = f"B6 stack of nine membranes, friction {mu:g}"
         yield case(name, paper, "membrane_stack", 0.5, friction=mu)
@@ -49,22 +44,6 @@ def tilts() -> Iterator[Case]:
 def paper(name: str, seconds: float, watched: dict | None = None, **options) -> Setting:
     """A scene as it is; ``options`` of its ``build``."""
     return Setting(scenes.load(name).build(**options), seconds, FPS, **watched or {})
-
-
-def squeezed(part: float) -> Setting:
-    """The upper cube comes down until the gap is a part of the diameter, waits and goes up."""
-    module = scenes.load("squeezed_sphere")
-    scene = module.build(speed=SPEED)
-    upper = scene.bodies[2]
-    held = np.flatnonzero(upper.fixed)
-    gap = float(upper.x[:, 2].min()) - module.EDGE
-    down = (gap - part * 2.0 * module.RADIUS) / SPEED
-
-    def drive(sim: wc.Simulation) -> None:
-        waiting, up = sim.time >= down, sim.time >= down + REST
-        sim.set_velocity(upper, (0.0, 0.0, SPEED * (up - (not waiting))), held)
-
-    return Setting(scene, 2.0 * down + REST, FPS, drive=drive)
 
 
 def collide(k: int) -> Setting:

@@ -1,24 +1,19 @@
 """B3: bodies of very unequal mass or stiffness; B9: fast impacts.
 
-A body of length l misses a plate of thickness w when v h > w + l. The missing is provoked twice:
-with the step left to the solver, which may take as many as it likes, and with a fixed step, which
-is refused where it is too long.
+A body of length l misses a plate of thickness w when v h > w + l. The solver may take as many
+steps h as it likes; a fixed one is in the map "speed".
 """
 
 from collections.abc import Iterator
 
-import numpy as np
-
 import warp_contact as wc
-from trials.outcome import BEYOND, FINE
 from trials.setting import NONE, UP, Case, Setting, body, case, setting, soft
 
 EDGE = 0.1  # [m]
 MAT = wc.box((1.0, 1.0, 0.1), (6, 6, 1))
 THICK, LENGTH = 0.002, 0.02  # of the plate and of the block that hits it [m]
-RATIOS = 0.5, 0.9, 1.1, 2.0, 5.0, 20.0  # way in a frame or a step, over the thickness
+RATIOS = 0.5, 0.9, 1.1, 2.0, 5.0, 20.0  # way in a frame, over the thickness
 RATE = 400.0  # frames per second
-STIFF, SOFT = 1e6, 1e3  # Young's modulus with the solver's steps, with fixed ones [Pa]
 
 
 def ratios() -> Iterator[Case]:
@@ -30,11 +25,6 @@ def ratios() -> Iterator[Case]:
     for where, (low, high) in (("on", kinds), ("below", kinds[::-1])):
         two = body(MAT, low, 0.051), body(MAT, high, (0.03, 0.0, 0.051 + 0.103))
         yield case(f"B3b soft mat {where} a stiff board, 1:10^4", setting, *two, **run)
-    yield case("B3c stiff ball on a mat whose ends are pulled", pulled)
-    for young in (1e2, 1e4, 1e6, 1e8):
-        low = body(MAT, soft(1e4), fixed="base")
-        high = body(MAT, soft(young), (0.03, 0.02, 0.105))
-        yield case(f"B3 mat of E {young:g} on one of 10^4", setting, low, high, seconds=0.3)
     for ratio in (1e2, 1e4):
         yield case(f"B3 densities 1:{ratio:g}, heavy on light", column, ratio, 1.0)
         yield case(f"B3 densities {ratio:g}:1, light on heavy", column, 1.0 / ratio, 1.0)
@@ -58,15 +48,6 @@ def speed() -> Iterator[Case]:
     yield case("B9 squishy ball, 5 m/s", setting, ball, planes=[UP], seconds=0.2, fps=1000.0)
     for ratio in RATIOS:
         yield case(f"B9 {ratio:g} plates a frame", through, ratio)
-    for ratio in RATIOS:
-        expect = FINE if ratio < 0.6 else BEYOND
-        yield case(f"B9 {ratio:g} plates a fixed step", through, ratio, 1, expect=expect)
-    v, plates = 2.5 * THICK * RATE, []
-    for sign in (-1.0, 1.0):
-        place = (0.005 * sign, 0.0, sign * (0.5 * THICK + 0.75 * v / RATE))
-        plates.append(body(wc.box((0.1, 0.1, THICK), (8, 8, 1)), soft(STIFF), place, v=-sign * v))
-    flight = {"gravity": NONE, "seconds": 20.0 / RATE, "fps": RATE}
-    yield case("B9 plate on plate, 5 plates a frame", setting, *plates, **flight)
 
 
 def own_weight(moduli: float) -> Setting:
@@ -86,19 +67,6 @@ def heavy(seconds: float, speed: float = 0.0) -> Setting:
     return setting(small, large, friction=0.5, planes=[UP], seconds=seconds)
 
 
-def pulled() -> Setting:
-    """A stiff ball lies on a mat whose ends are pulled apart by 0.28."""
-    x = MAT.vertices[:, 0]
-    ends = np.abs(x) > 0.49
-    side = np.sign(x[ends])[:, None] * [1.0, 0.0, 0.0]
-
-    def drive(sim: wc.Simulation) -> None:
-        sim.set_velocity(0, (0.14 if sim.time < 1.0 else 0.0) * side, np.flatnonzero(ends))
-
-    ball = body(wc.sphere(0.2, 55), soft(1e8, 2000.0), 0.255)
-    return setting(body(MAT, soft(1e6), fixed=ends), ball, seconds=2.0, drive=drive)
-
-
 def column(density: float, young: float) -> Setting:
     """A cube on one that is held; the lower one is strained by 5 % at rest, by the heavier one."""
     base = 20.0 * max(density, 1.0) * 1000.0 * 9.81 * EDGE * max(1.0, 1.0 / young)
@@ -116,12 +84,12 @@ def golf(count: int, speed: float) -> Setting:
     return setting(wall, ball, gravity=NONE, seconds=0.004, fps=10000.0, pairs=pairs)
 
 
-def through(ratio: float, substeps: int | None = None) -> Setting:
-    """A block hits a thin plate that is held; with fixed steps below its speed of sound up to 2."""
-    rubber = soft(STIFF if substeps is None else SOFT)
+def through(ratio: float) -> Setting:
+    """A block hits a thin plate that is held."""
+    rubber = soft(1e6)
     plate = body(wc.box((0.1, 0.1, THICK), (3, 3, 1)), rubber, fixed=True)
     v = ratio * THICK * RATE
     place = (0.003, 0.002, 0.5 * (THICK + LENGTH) + 0.75 * v / RATE)
     block = body(wc.box(LENGTH, 2), rubber, place, v=-v)
     seconds = (4.0 * LENGTH + v / RATE) / v + 10.0 / RATE
-    return setting(plate, block, gravity=NONE, seconds=seconds, fps=RATE, substeps=substeps)
+    return setting(plate, block, gravity=NONE, seconds=seconds, fps=RATE)

@@ -11,7 +11,7 @@ from matplotlib import pyplot as plt
 from matplotlib.colors import ListedColormap
 
 from trials.outcome import OUTCOMES, classify
-from trials.sweeps import SWEEPS, Sweep, frontier, limit_line
+from trials.sweeps import SWEEPS, Sweep
 from trials.watch import METHODS, attempt
 
 FIGURES = {  # of a cell: its columns, and the fields of its record
@@ -25,8 +25,6 @@ COLUMNS = "sweep", "method", "x_name", "x", "y_name", "y", "outcome", *FIGURES
 CUT = {"most_steps": 6000, "limit": 30.0}  # steps and seconds that a cell may take
 COLOURS = "#dcefdc", "#f6d55c", "#ed8b3b", "#c0392b", "#5b2c6f", "#8d99a6", "#1b1b1b", "#ffffff"
 SHADES = {"cmap": ListedColormap(COLOURS), "vmin": -0.5, "vmax": len(OUTCOMES) - 0.5}
-LINE = {"color": "black", "linewidth": 2.0}
-DOTS = {"color": "black", "linewidth": 1.5, "linestyle": ":"}
 
 
 def draw(names: list[str], out: Path) -> None:
@@ -68,21 +66,14 @@ def picture(s: Sweep, found: dict[str, list[list[str]]], path: Path) -> None:
     legend.axis("off")
     for outcome, colour in zip(OUTCOMES, COLOURS, strict=True):
         legend.scatter([], [], s=120, marker="s", color=colour, edgecolor="grey", label=outcome)
-    legend.plot([], [], label="frontier of what is fine", **LINE)
-    if s.limit:
-        legend.plot([], [], label=s.limit[0], **DOTS)
     legend.legend(loc="center", fontsize=10)
     figure.savefig(path, dpi=100)
     plt.close(figure)
 
 
 def panel(ax, s: Sweep, grid: list[list[str]]) -> None:
-    """Colours of the outcomes, a line around what is fine, the limit."""
+    """Colours of the outcomes, and the values of both axes."""
     ax.imshow([[OUTCOMES.index(o) for o in row] for row in grid], origin="lower", **SHADES)
-    for ends in frontier(grid):
-        ax.plot(*ends, **LINE)
-    if s.limit:
-        ax.plot(*limit_line(s), **DOTS)
     xs, ys = s.axes()
     ax.set_xticks(range(len(xs)), [f"{x:.2g}" for x in xs], rotation=90)
     ax.set_yticks(range(len(ys)), [f"{y:.2g}" for y in ys])

@@ -26,7 +26,7 @@ GAIN = 0.01  # energy, of its scale: see watch.py
 FLAT = 0.0  # volume of a tet at the end, of that at rest
 EXCELLENT_SUNK, EXCELLENT_GAIN = 0.01, 0.001  # and no tet inverts on the way
 BEYOND = "beyond"  # expected of what has a meaning, but not for this method
-ELEMENTS = "body", "vertex", "tet", "face", "edge", "fps", "gravity", "substeps"
+ELEMENTS = "body", "tet", "substeps"
 
 
 @dataclass
@@ -75,16 +75,14 @@ def classify(r: Record) -> str:
 def level(r: Record, expect: str = FINE) -> str:
     """The level of a run.
 
-    It is expected to be ``fine``, ``refused``, or ``beyond``, where a refusal is good at most. A
-    refusal has to name the vertex, tet, face, edge or argument that is wrong.
+    It is expected to be ``fine``, or ``beyond``, where a refusal is good at most and has to name
+    the body, tet or argument that is wrong.
     """
     found = classify(r)
-    named = any(word in r.refused for word in ELEMENTS)
     if expect == BEYOND:
+        named = any(word in r.refused for word in ELEMENTS)
         return GOOD if found == REFUSED and named else MISSED
-    if found != expect:
+    if found != FINE:
         return MISSED
-    if found == REFUSED:
-        return EXCELLENT if named else GOOD
     clean = r.overlap <= EXCELLENT_SUNK and r.gained <= EXCELLENT_GAIN and r.lowest > FLAT
     return EXCELLENT if clean else GOOD

@@ -1,4 +1,4 @@
-"""Bodies of few tets: spikes, wedges, single tets, rings; and how to turn them."""
+"""Bodies of few tets: spikes, wedges, single tets, rings."""
 
 import numpy as np
 
@@ -6,19 +6,6 @@ import warp_contact as wc
 
 AS_IS = 0.0, 0.0, 0.0, 1.0  # quaternions (x, y, z, w)
 UPSIDE_DOWN = 1.0, 0.0, 0.0, 0.0  # half a turn about x
-
-
-def about(axis: str, degrees: float) -> np.ndarray:
-    """A turn about x, y or z as a quaternion (x, y, z, w)."""
-    half = np.radians(degrees) / 2.0
-    return np.append(np.sin(half) * np.eye(3)["xyz".index(axis)], np.cos(half))
-
-
-def both(second, first) -> np.ndarray:
-    """The quaternion of two turns, ``first`` before ``second``."""
-    a, b = np.asarray(second, dtype=float), np.asarray(first, dtype=float)
-    vector = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
-    return np.append(vector, a[3] * b[3] - a[:3] @ b[:3])
 
 
 def spike(height: float = 3.0) -> wc.TetMesh:

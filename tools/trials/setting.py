@@ -34,8 +34,8 @@ class Case(NamedTuple):
     """A setting, and what ought to come of it."""
 
     name: str  # number in the specification and a few words
-    build: Callable[[], Setting]  # raises ValueError where the input is refused
-    expect: str = FINE  # or ``refused``, or ``beyond``: refused though it has a meaning
+    build: Callable[[], Setting]
+    expect: str = FINE  # or ``beyond``: refused though it has a meaning
 
 
 def case(name: str, build: Callable, *args, expect=FINE, **named) -> Case:

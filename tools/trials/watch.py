@@ -41,11 +41,8 @@ def attempt(
 ) -> Record:
     """Build a setting and run it to its end or its first failure for good.
 
-    Args:
-        build: the setting; what cannot be built is refused
-        method: one of ``METHODS``
-        most_steps: after which the run is not followed further
-        limit: seconds that it may take
+    What cannot be built is refused. A run is not followed further than ``most_steps``, and may take
+    ``limit`` seconds.
     """
     r, sim = Record(), None
     try:

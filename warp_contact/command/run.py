@@ -17,6 +17,7 @@ from types import ModuleType
 
 import numpy as np
 
+from warp_contact.command.lock import RunLock
 from warp_contact.errors import UsageError
 from warp_contact.progress import Progress, announce
 from warp_contact.scene.scene import Scene
@@ -37,9 +38,18 @@ def run(args) -> int:
     n = args.frames or getattr(module, "FRAMES", 120)
     announce("loading the kernels (the first run compiles them)", args.quiet)
     try:
-        sim = simulation(module, scene, args)
         root = root_path(args.out)
-        saved, metrics = root.with_name("checkpoint.npz"), root.with_name("metrics.jsonl")
+        sim = simulation(module, scene, args)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    with RunLock(root):
+        return write_run(sim, module, root, n, args)
+
+
+def write_run(sim: Simulation, module, root: Path, n: int, args) -> int:
+    """Step the simulation and write the run, or go on with an earlier one."""
+    saved, metrics = root.with_name("checkpoint.npz"), root.with_name("metrics.jsonl")
+    try:
         kept = go_on(sim, root, saved, metrics) if args.resume else 0
         view = getattr(module, "VIEW", None)
         view = (view["eye"], view["target"]) if view else None

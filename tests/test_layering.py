@@ -47,7 +47,7 @@ ONLY_IN = {  # packages that the solver does without
     "matplotlib": set(),
 }
 # Folders whose files and functions are short.
-SIZED = ("warp_contact", "kernels", "scenes", "tests")
+SIZED = ("warp_contact", "kernels", "scenes", "tests", "tools")
 LINES = 300  # of a file
 FUNCTION = 45  # lines of a host function, with its docstring
 

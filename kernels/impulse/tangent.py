@@ -29,7 +29,7 @@ impulse is along n_f. There is no ramp across a gap too wide for friction, nor a
 import warp as wp
 
 from warp_contact.kernels.mobility import Mobility, mobility_of
-from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.kernels.narrow_phase.contact import Contact, is_of_edge
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, contacts_of
 from warp_contact.kernels.options import OPTIONS
 
@@ -64,7 +64,7 @@ def allowed(p: wp.vec3, normal: float, mu: float, ramp: wp.vec3) -> wp.vec3:
 def slope(c: Contact, x: wp.array[wp.vec3]) -> wp.vec3:
     """The ramp t of a contact of a vertex with a triangle; 0 for others."""
     none = wp.vec3(0.0, 0.0, 0.0)
-    if c.vert[1] != c.vert[0]:  # an edge
+    if is_of_edge(c):
         return none
     a = x[c.vert[2]]
     face = wp.normalize(wp.cross(x[c.vert[3]] - a, x[c.vert[4]] - a))

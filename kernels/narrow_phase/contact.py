@@ -38,6 +38,24 @@ class Contact:
 
 
 @wp.func
+def is_of_edge(c: Contact) -> bool:
+    """Whether the first side is a point of an edge, not a vertex."""
+    return c.vert[1] != c.vert[0]
+
+
+@wp.func
+def meets_edge(c: Contact) -> bool:
+    """Whether the other side is a point of an edge, not of a triangle."""
+    return c.vert[3] == c.vert[4]
+
+
+@wp.func
+def meets_body(c: Contact) -> bool:
+    """Whether there is another side that can move: not so for a plane."""
+    return c.vert[2] != c.vert[0]
+
+
+@wp.func
 def gap(c: Contact, x: wp.array[wp.vec3]) -> float:
     """Gap of a contact [m]; relative to one vertex, as float32 is coarse far from the origin."""
     origin = x[c.vert[0]]
@@ -66,7 +84,7 @@ def gradient(k: int, c: Contact, x: wp.array[wp.vec3]) -> wp.vec3:
     q = x[c.vert[1]]
     a = x[c.vert[2]]
     b = x[c.vert[3]]
-    if c.vert[3] == c.vert[4]:  # two edges
+    if meets_edge(c):
         if k == 4:
             return wp.vec3(0.0, 0.0, 0.0)
         along = wp.cross(b - a, n)

@@ -7,7 +7,7 @@ part of a torque.
 import warp as wp
 
 from warp_contact.kernels.mobility import Mobility, mobility_of
-from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.kernels.narrow_phase.contact import Contact, meets_body
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.sorting import sort
 
@@ -29,7 +29,7 @@ def takes_part(c: Contact, k: int) -> bool:
     """Whether vertex k of a contact can receive an impulse; unused places repeat a vertex."""
     if c.coef[k] != 0.0:
         return True
-    if c.vert[2] == c.vert[0]:
+    if not meets_body(c):
         return False
     if k == 1 or k == 4:
         return c.vert[k] != c.vert[k - 1]

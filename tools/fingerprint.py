@@ -1,6 +1,6 @@
 """One hash for each of some short runs that together reach every kernel of a simulation.
 
-    python tools/fingerprint.py [run ...] [--against FILE] [--reach]
+    python tools/fingerprint.py [run ...] [--against FILE] [--reach] [--device NAME]
 
 A hash is of positions, velocities, contact forces and contact fields after every frame, to the last
 bit: a change that is meant to change nothing leaves all of them as they were, and one that is meant
@@ -8,8 +8,9 @@ to change something says which. Bits depend on the processor and on the version 
 on one machine only: ``--against`` compares with a file of what was printed before, and the exit
 status is 1 when any differs. ``--reach`` prints which kernels no run has launched.
 
-Kernels are compiled so that each product and each sum is rounded by itself. As simulations run them
-the compiler contracts some of them, which depends on how the arrays lie in memory.
+On the CPU kernels are compiled so that each product and each sum is rounded by itself. As
+simulations run them the compiler contracts some of them, which depends on how the arrays lie in
+memory.
 """
 
 import sys
@@ -209,7 +210,9 @@ def main() -> int:
     parser.add_argument("runs", nargs="*", type=one_of(RUNS), metavar="run", help="or all")
     parser.add_argument("--against", type=Path, metavar="FILE", help="compare with those of a file")
     parser.add_argument("--reach", action="store_true", help="name kernels that no run launched")
+    parser.add_argument("--device", help="cpu, cuda:0, ...")
     args = parser.parse_args()
+    wp.set_device(args.device)
     round_each_operation()
     lines = args.against.read_text(encoding="utf-8").splitlines() if args.against else []
     before = dict(line.split() for line in lines)

@@ -1,0 +1,52 @@
+"""Whether the scenes of the paper begin on a device as they do on the CPU.
+
+    python tools/devices.py [DEVICE]
+
+``apart`` is the largest distance between a vertex and the same vertex of the CPU's run after four
+frames, in lengths of the scene. Sums are rounded in another order there, so a last digit may
+differ; on the CPU alone two ways of rounding are up to 2.3e-4 apart (``two_bodies``).
+"""
+
+import sys
+from functools import partial
+
+import numpy as np
+import warp as wp
+from measure import machine, report
+from measure.figure import Figure, Figures
+from measure.run import command_line, run, status
+
+import warp_contact as wc
+from warp_contact import scenes
+
+FRAMES = 4
+APART = 1e-3  # four times what rounding does
+
+
+def positions(name: str, device: str) -> np.ndarray:
+    """Vertices after the first frames [m]."""
+    sim = wc.Simulation(scenes.load(name).build(), device=device)
+    for _ in sim.frames(FRAMES):
+        pass
+    return np.concatenate([sim.positions(body) for body in range(len(sim.scene.bodies))])
+
+
+def compare(name: str, device: str) -> Figures:
+    """One scene on both devices."""
+    ours, theirs = positions(name, device), positions(name, "cpu")
+    apart = np.linalg.norm(ours - theirs, axis=1).max() / np.ptp(theirs, axis=0).max()
+    yield Figure(name, "apart [of the scene]", float(apart), most=APART)
+
+
+def main() -> int:
+    """Print a figure for each scene; 1 where one is too far from the CPU's."""
+    parser = command_line(__doc__)
+    parser.add_argument("device", nargs="?", help="as Warp names it, or its default")
+    args = parser.parse_args()
+    device = str(wp.get_device(args.device))
+    print(machine.line(device), "", report.FIGURES.head(), sep="\n")
+    return status(run({name: partial(compare, name, device) for name in scenes.names()}))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

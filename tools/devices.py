@@ -3,8 +3,8 @@
     python tools/devices.py [DEVICE]
 
 ``apart`` is the largest distance between a vertex and the same vertex of the CPU's run after four
-frames, in lengths of the scene. Sums are rounded in another order there, so a last digit may
-differ; on the CPU alone two ways of rounding are up to 2.3e-4 apart (``two_bodies``).
+frames, in lengths of the scene. The CPU's run rounds each product and each sum by itself. So
+``devices.py cpu`` says how far roundings alone carry a scene.
 """
 
 import sys
@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 import warp as wp
+from fingerprint import round_each_operation
 from measure import machine, report
 from measure.figure import Figure, Figures
 from measure.run import command_line, run, status
@@ -20,7 +21,7 @@ import warp_contact as wc
 from warp_contact import scenes
 
 FRAMES = 4
-APART = 1e-3  # four times what rounding does
+APART = 1e-3  # three times what roundings alone do, 3.3e-4 in two_bodies
 
 
 def positions(name: str, device: str) -> np.ndarray:
@@ -31,9 +32,9 @@ def positions(name: str, device: str) -> np.ndarray:
     return np.concatenate([sim.positions(body) for body in range(len(sim.scene.bodies))])
 
 
-def compare(name: str, device: str) -> Figures:
-    """One scene on both devices."""
-    ours, theirs = positions(name, device), positions(name, "cpu")
+def compare(name: str, ours: np.ndarray) -> Figures:
+    """The positions of a scene against those on the CPU."""
+    theirs = positions(name, "cpu")
     apart = np.linalg.norm(ours - theirs, axis=1).max() / np.ptp(theirs, axis=0).max()
     yield Figure(name, "apart [of the scene]", float(apart), most=APART)
 
@@ -45,7 +46,9 @@ def main() -> int:
     args = parser.parse_args()
     device = str(wp.get_device(args.device))
     print(machine.line(device), "", report.FIGURES.head(), sep="\n")
-    return status(run({name: partial(compare, name, device) for name in scenes.names()}))
+    found = {name: positions(name, device) for name in scenes.names()}
+    round_each_operation()
+    return status(run({name: partial(compare, name, ours) for name, ours in found.items()}))
 
 
 if __name__ == "__main__":

@@ -26,9 +26,9 @@ part() { # name, longest time [s], command
     fi
 }
 
-part first 90 "$python" tools/fingerprint.py --device "$device"
-part bits 60 "$python" tools/fingerprint.py --device "$device" --against "$out/first.txt"
-part scenes 60 "$python" tools/devices.py "$device"
+part first 80 "$python" tools/fingerprint.py --device "$device"
+part bits 40 "$python" tools/fingerprint.py --device "$device" --against "$out/first.txt"
+part scenes 90 "$python" tools/devices.py "$device"
 part bench 120 "$python" tools/bench.py two_bodies membrane_stack bowl \
     pile_1000 pile_10000 pile_100000 worlds_1 worlds_16 worlds_256 \
     --device "$device" --repeats 3

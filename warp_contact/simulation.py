@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import warp as wp
@@ -28,7 +28,8 @@ class Simulation:
         fps: frames per second
         frame: number of the last finished frame
         model: what stays constant, as Warp arrays
-        state: positions [m] and velocities [m/s] as Warp arrays, shape (n_vert,)
+        state: positions [m] and velocities [m/s] as Warp arrays, shape (n_vert,); the velocities
+            are those of half a step before, ``velocities`` has those of the same time
         device: where the arrays are
     """
 
@@ -81,7 +82,7 @@ class Simulation:
     @property
     def substeps(self) -> int:
         """Steps of the last frame."""
-        return self._stepper.n
+        return self._stepper.last.n
 
     @property
     def time(self) -> float:
@@ -121,8 +122,10 @@ class Simulation:
         return self.state.x.numpy()[self._range(body)].copy()
 
     def velocities(self, body: Body | int | str | None = None) -> np.ndarray:
-        """Copy of the velocities [m/s] of one body or of all, shape (n, 3)."""
-        return self.state.v.numpy()[self._range(body)].copy()
+        """Velocities [m/s] of one body or of all, at the time of the positions, shape (n, 3)."""
+        chosen = self._range(body)
+        with exclusively(self.device):
+            return self._stepper.velocities()[chosen]
 
     def set_positions(self, body: Body | int | str | None, positions, vertices=None) -> None:
         """Put vertices elsewhere between frames, as at the start of an episode.
@@ -148,10 +151,9 @@ class Simulation:
             raise ValueError(f"{of} are not finite")
         with exclusively(self.device):
             self._meter.tunnelling.follow(self.state.x)
-            self.state.x.assign(x)
+            self._stepper.set_positions(x)
             own = self.model.vert_body.numpy()[self._range(body)]
             self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
-            self._stepper.look_anew()
 
     def set_velocity(self, body: Body | int | str, velocity, vertices=None) -> None:
         """Set velocities [m/s] between frames; fixed vertices keep theirs from then on.
@@ -164,7 +166,7 @@ class Simulation:
         Raises:
             ValueError: there is no such body or vertex, or it is not finite or of that shape
         """
-        v = self.state.v.numpy().copy()
+        v = np.zeros((self.model.n_vert, 3), dtype=np.float32)
         part, chosen = self._choose(v, body, vertices)
         of = f"velocity of body '{self._label(body)}'"
         if np.shape(velocity) not in ((3,), part[chosen].shape):
@@ -172,16 +174,40 @@ class Simulation:
         part[chosen] = velocity
         if not np.isfinite(part).all():
             raise ValueError(f"{of} is not finite")
-        self.state.v.assign(v)
-        if self._stepper.sleeping:
-            self._stepper.sleeping.wake(self._index(body))
+        at = self._range(body).start + chosen
+        with exclusively(self.device):
+            self._stepper.set_velocities(v[at], at, self._index(body))
+
+    def reset(self, worlds: Iterable[int] | None = None) -> None:
+        """Begin anew: the next frames give the bits of the first ones.
+
+        With ``worlds``, bodies in these alone are put where they began; ``frame`` and others go on.
+
+        Raises:
+            ValueError: no body is in one of the worlds
+        """
+        x, v = self._stepper.first
+        if worlds is None:
+            with exclusively(self.device):
+                self._stepper.reset()
+                self._meter = Meter(self.model)
+            self.frame = 0
+            return
+        own = self.model.body_world.numpy()
+        for world in worlds:
+            if not (own == world).any():
+                raise ValueError(f"no body is in world {world!r}")
+            for body in np.flatnonzero(own == world):
+                part = self._range(int(body))
+                self.set_positions(int(body), x[part])
+                self.set_velocity(int(body), v[part])
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""
         with exclusively(self.device):
             duration = 1.0 / self.fps if self.frame else 0.0
-            dt = duration / max(self.substeps, 1)
-            return self._meter.measure(self.state, self._stepper.work, duration, dt)
+            s = self._stepper
+            return self._meter.measure(self.state, s.velocities(), s.work, duration, s.last.dt)
 
     def contact_fields(self) -> dict[str, np.ndarray]:
         """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.

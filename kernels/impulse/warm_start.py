@@ -51,6 +51,7 @@ def is_first(c: int, n_vertex: int, contact: wp.array[Contact]) -> bool:
 def recall_vertices(
     # in
     threads: int,
+    share: float,  # of the kept impulses: 1 for a whole step
     n_vertex: wp.array[int],  # (1,) contacts of vertices
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -68,7 +69,7 @@ def recall_vertices(
         to = constraint[c]
         i = at.vert[0]
         if to.inv_mass > 0.0 and is_first(c, n_vertex[0], contact) and partner[i] == at.pair[1]:
-            impulse[c] = started(turned(kept[i], at.normal, to.friction, to.ramp))
+            impulse[c] = started(turned(share * kept[i], at.normal, to.friction, to.ramp))
         p = impulse[c].normal * at.normal + impulse[c].friction
         for k in range(5):
             part[5 * c + k] = part_of(k, at, to, p)
@@ -78,6 +79,7 @@ def recall_vertices(
 def recall_edges(
     # in
     threads: int,
+    share: float,  # of the kept impulses: 1 for a whole step
     n_vertex: wp.array[int],  # (1,) contacts of vertices
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -91,7 +93,7 @@ def recall_edges(
     for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
         if constraint[c].inv_mass > 0.0:
             level = wp.vec3(0.0, 0.0, 0.0)
-            kept = found[source[c]].kept
+            kept = share * found[source[c]].kept
             impulse[c] = started(turned(kept, contact[c].normal, constraint[c].friction, level))
 
 

@@ -1,4 +1,4 @@
-"""Stage 1, predict: corner forces gathered, symplectic Euler, damping.
+"""Stage 1, predict: corner forces gathered, symplectic Euler.
 
     f_i = sum of f_tet over the corners at vertex i        [N]
     v'  = v + h (f / m + g)                                [m/s]
@@ -6,19 +6,6 @@
 
 ``vt_corner`` lists the corners at a vertex as 4 tet + corner. They are added in the order of
 that list and never by atomics, so runs repeat bit for bit.
-
-Damping M dv/dt = -C v over h, in s stages of RKL1 over h / a, whose result counts by the share a:
-
-    Y_0 = v,  Y_j = (2j-1)/j Y_{j-1} - (j-1)/j Y_{j-2} - (2j-1)/j 2h/(a (s^2+s)) M^-1 C Y_{j-1}
-    v' = (1 - a) v + a Y_s = p v,  p = 1 - a + a P_s(1 - 2 z/(a (s^2+s))),  z = h L, L of M^-1 C
-
-with P_s the Legendre polynomial. p = 1 - z + O(z^2), and |p| <= 1 for z < a (s^2+s). For a = 1/2 no
-mode changes sign, 0 < p. A larger share allows a larger z with as many stages. Damping comes before
-the forces, so that the state at rest does not depend on it. For a mode of frequency w, Euler then
-is v' = p v - h w^2 x, x' = x + h v': stable for (h w)^2 < 2 (1 + p).
-
-Source of RKL1: Meyer, Balsara, Aslam 2014, "A stabilized Runge-Kutta-Legendre method for
-explicit super-time-stepping of parabolic and mixed equations".
 """
 
 import warp as wp
@@ -89,35 +76,6 @@ def advance(
     """One thread per vertex: drift."""
     i = wp.tid()
     x_new[i] = x[i] + dt[0] * v[i]
-
-
-@wp.kernel
-def relax(
-    # in
-    vt_start: wp.array[int],  # (n_vert + 1,)
-    vt_corner: wp.array[int],  # (4 n_tet,)
-    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N], C Y_{j-1}
-    inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
-    dt: wp.array[float],  # (1,) [s]
-    j: int,
-    s: int,
-    share: wp.array[float],  # (1,) a
-    v: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_0
-    last: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_{j-1}
-    before: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_{j-2}
-    # out
-    y: wp.array[wp.vec3],  # (n_vert,) [m/s], Y_j, v' for j = s; may be any of these
-):
-    """One thread per vertex: stage j of s of the damping."""
-    i = wp.tid()
-    u = last[i]
-    if inv_mass[i] > 0.0:
-        back = float(1 - j) / float(j)
-        kick = 2.0 * dt[0] / share[0] * float(2 * j - 1) / float(j * s * (s + 1)) * inv_mass[i]
-        u += back * (before[i] - u) - kick * corner_sum(i, vt_start, vt_corner, f_tet)
-        if j == s:
-            u = share[0] * u + (1.0 - share[0]) * v[i]
-    y[i] = u
 
 
 @wp.kernel

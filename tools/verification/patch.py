@@ -24,7 +24,8 @@ SETTLE = 12.0  # 1 / (slowest frequency)
 # methods nothing.
 RMS = 0.05, 0.015, 1e-4
 MAX = 0.2, 0.03, 1e-4
-FORCE = 0.02, 0.002, 1e-4
+# The resting gap, up to 1e-4 m of the push of 0.01 m, leaves the force open by some 0.3 %.
+FORCE = 0.02, 0.003, 1e-4
 
 
 def run(quick: bool) -> Figures:

@@ -112,7 +112,7 @@ def rest(
         if frame > (1.0 - part) * frames:
             found.append(of())
         ahead = 0.5 * acceleration(sim) / (sim.fps * max(sim.substeps, 1))
-        v = sim.velocities()
+        v = sim.state.v.numpy()
         calmed = np.where(mobile[:, None], factor * (v + ahead) - ahead, v)
         sim.state.v.assign(calmed.astype(np.float32))
     return np.array(found)

@@ -36,6 +36,13 @@ def copy(to: ContactForces, of: ContactForces) -> None:
     wp.copy(to.pair_total[:n], of.pair_total)
 
 
+def clear(forces: ContactForces) -> None:
+    """Forget all impulses."""
+    forces.received.zero_()
+    forces.pair_key.fill_(-1)
+    forces.pair_total.zero_()
+
+
 def allocate(n_vert: int, n_pair: int, unit: float) -> ContactForces:
     """Allocate without any impulse."""
     return ContactForces(

@@ -50,3 +50,15 @@ def allocate(n_vert: int, capacity: int, n_vertex: wp.array[int]) -> Contacts:
         impulse=wp.zeros(capacity, dtype=Impulse),
         part=wp.zeros(5 * capacity, dtype=wp.vec3),
     )
+
+
+def copied(contacts: Contacts) -> tuple[wp.array, ...]:
+    """What is read of them between frames, in arrays of its own."""
+    return tuple(wp.clone(a) for a in (contacts.n, contacts.n_vertex, contacts.record))
+
+
+def copy(to: Contacts, of: tuple[wp.array, ...]) -> None:
+    """Put back what was ``copied``; it fits."""
+    wp.copy(to.n, of[0])
+    wp.copy(to.n_vertex, of[1])
+    wp.copy(to.record, of[2], count=len(of[2]))

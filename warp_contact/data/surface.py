@@ -21,7 +21,7 @@ class Surface:
         slack: part of it that later steps close [m], shape (contacts,)
         push: of the closure [kg m], shape (contacts,)
         mask: tets that touch the region, shape (n_tet,)
-        s: displacement vectors of eq. (1) [m]; before, scratch of the damping, shape (n_vert,)
+        s: displacement vectors of eq. (1) [m], shape (n_vert,)
         area: areas of comparison [m^2], shape (n_vert,)
         at_start, at_trial: tractions before the search and at a trial [Pa], shape (n_vert,)
         stiffness: traction gained over the whole of s [Pa], shape (n_vert,)

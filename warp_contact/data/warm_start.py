@@ -39,6 +39,12 @@ def allocate(n_vert: int, n_contact: int) -> WarmStart:
     )
 
 
+def forget(warm: WarmStart) -> None:
+    """The next step has no impulses to start from."""
+    warm.partner.fill_(-1)
+    warm.n_edge.zero_()
+
+
 def copied(warm: WarmStart) -> WarmStart:
     """The same in arrays of its own."""
     return WarmStart(*(wp.clone(array) for array in vars(warm).values()))

@@ -8,6 +8,7 @@ from warp_contact.data import (
     broad_phase,
     contact_forces,
     contacts,
+    damping,
     narrow_phase,
     overflow,
     scan,
@@ -30,7 +31,6 @@ class Work:
         capacity: of the lists
         overflow: what did not fit
         dt: the step [s], shape (1,)
-        share: weight of the damped velocity [-], shape (1,)
         steps: how many the frame still has, shape (1,)
         awake: what moves
         mesh: what the search for contacts reads of the model
@@ -38,7 +38,7 @@ class Work:
         scan: scratch of running sums
         f_tet: forces on the corners of each tet [N], shape (4 n_tet,)
         x: predicted positions, then those before the search [m], shape (n_vert,)
-        v: scratch of the damping [m/s], shape (n_vert,)
+        damping: of damped bodies; None where no body is damped
         broad_phase: which pairs may touch
         narrow_phase: intermediate results on the way to the contacts
         contacts: the contacts of the step
@@ -51,7 +51,6 @@ class Work:
     capacity: overflow.Capacity
     overflow: overflow.Overflow
     dt: wp.array[float]
-    share: wp.array[float]
     steps: wp.array[int]
     awake: Awake
     mesh: Mesh
@@ -59,7 +58,7 @@ class Work:
     scan: list[wp.array[int]]
     f_tet: wp.array[wp.vec3]
     x: wp.array[wp.vec3]
-    v: wp.array[wp.vec3]
+    damping: damping.Damping | None
     broad_phase: broad_phase.BroadPhase
     narrow_phase: narrow_phase.NarrowPhase
     contacts: contacts.Contacts
@@ -101,7 +100,6 @@ def allocate_work(
         capacity=capacity,
         overflow=overflow.allocate(),
         dt=wp.zeros(1, dtype=float),
-        share=wp.full(1, 1.0, dtype=float),
         steps=wp.zeros(1, dtype=int),
         awake=awake or everything(model),
         mesh=mesh_of(model, broad.surface),
@@ -111,7 +109,7 @@ def allocate_work(
         ),
         f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=wp.zeros(n, dtype=wp.vec3),
-        v=wp.zeros(n, dtype=wp.vec3),
+        damping=damping.allocate(model),
         broad_phase=broad,
         narrow_phase=narrow,
         contacts=contacts.allocate(n, m, narrow.n_inside),

@@ -55,6 +55,11 @@ def read(path: str | os.PathLike, scene: str) -> dict[str, np.ndarray]:
     return values
 
 
+def ungroup(groups: dict[str, dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """The values of groups in one dictionary, called ``name.something``."""
+    return {f"{name}.{k}": value for name, values in groups.items() for k, value in values.items()}
+
+
 def group(values: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
     """The values called ``name.something``, by something."""
     return {k.removeprefix(f"{name}."): v for k, v in values.items() if k.startswith(f"{name}.")}

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_contact.data import contact_forces, warm_start
+from warp_contact.data import contact_forces, damping, warm_start
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 
@@ -14,6 +14,7 @@ class FrameStart:
         """Keep what is now."""
         self._x, self._v = wp.clone(state.x), wp.clone(state.v)
         self._warm = warm_start.copied(work.warm)
+        self._damping = damping.copied(work.damping)
         self._forces = contact_forces.copied(work.forces)
 
     def keep(self, state: State, work: Work) -> None:
@@ -24,6 +25,7 @@ class FrameStart:
         wp.copy(self._x, state.x)
         wp.copy(self._v, state.v)
         warm_start.copy(self._warm, work.warm)
+        damping.keep(self._damping, work.damping)
         contact_forces.copy(self._forces, work.forces)
 
     def go_back(self, state: State, work: Work) -> None:
@@ -31,6 +33,7 @@ class FrameStart:
         wp.copy(state.x, self._x)
         wp.copy(state.v, self._v)
         warm_start.copy(work.warm, self._warm)
+        damping.copy(work.damping, self._damping)
 
     def undo(self, state: State, work: Work) -> None:
         """Restore all, as if the frame had not begun."""

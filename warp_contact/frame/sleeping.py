@@ -158,6 +158,7 @@ class Sleeping:
     def skip_frame(self, state: State, work: Work) -> None:
         """Stop everything."""
         state.v.zero_()
+        self.awake.inv_mass.zero_()
         work.contacts.n.zero_()
 
     def begin_frame(self, state: State, work: Work) -> None:

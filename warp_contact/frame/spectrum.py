@@ -105,6 +105,11 @@ class Spectrum:
         """The body with the largest frequency, where ``rates`` were last asked for."""
         return int(self._of_bodies[0].argmax())
 
+    @property
+    def most_damped(self) -> int:
+        """The body with the largest damping rate, there."""
+        return int(self._of_bodies[1].argmax())
+
     def omega(self, x: wp.array) -> float:
         """Angular frequency [1/s] of the fastest mode at the positions ``x`` [m].
 

@@ -8,13 +8,13 @@
 omega is the largest frequency of the elastic forces [1/s], u the largest relative speed [m/s], t
 the thickness of the thinnest body [m] and e the shortest mean edge of a body [m], all at the start
 of the frame. LINGERING replaces TRAVEL while there may be overlaps older than the step. At the end
-of the frame the step must still be below ``UNSTABLE`` of ``damping.longest_step`` / omega, and its
-damping within ``damping.reach``. A frame that fails is repeated at the rates found there.
+of the frame the step must still be below ``UNSTABLE`` 2 / omega, and its damping within
+``damping.reach_for``. A frame that fails is repeated at the rates found there.
 """
 
 import math
 
-from warp_contact.frame.damping import longest_step, reach, share_for, stages_for
+from warp_contact.frame.damping import reach_for
 from warp_contact.kernels.lengths import LINGERING, TRAVEL
 
 SAFETY = 0.6  # of the stable step 2 / omega at the start of a frame
@@ -59,17 +59,14 @@ def with_penalty(omega: float, stiffness: float, inv_mass: float) -> float:
     return math.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
 
 
-def stays_stable(dt: float, omega: float, rate: float) -> bool:
-    """Whether a step ``dt`` [s] is stable at the frequency ``omega`` [1/s] of its frame's end.
-
-    With the damping for a ``rate`` [1/s], that at its start.
-    """
-    return dt * omega <= UNSTABLE * longest_step(stages_for(rate, dt), share_for(rate, dt))
+def stays_stable(dt: float, omega: float) -> bool:
+    """Whether a step ``dt`` [s] is stable at the frequency ``omega`` [1/s] of its frame's end."""
+    return dt * omega <= UNSTABLE * 2.0
 
 
 def stays_damped(dt: float, rate: float, after: float) -> bool:
-    """Whether stages and share for the damping ``rate`` [1/s] suffice for that ``after`` too."""
-    return after * dt <= reach(stages_for(rate, dt), share_for(rate, dt))
+    """Whether the stages for the damping ``rate`` [1/s] suffice for that ``after`` too."""
+    return after * dt <= reach_for(rate, dt)
 
 
 def served(dt: float) -> float:

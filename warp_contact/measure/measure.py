@@ -22,15 +22,15 @@ class Measure:
     """One frame in numbers.
 
     Attributes:
-        kinetic: energy [J] at the time of the frame; the velocities of symplectic Euler are those
-            of half a step earlier, so h/2 times the power of internal forces and gravity is added.
-            The sum of all energies is then constant for a linear material in free flight, and a
-            contact impulse p changes it by p . (v + v') / 2, v and v' the velocities before and
-            after the step: not at all while the contact stays closed
+        kinetic: energy [J] at the time of the positions, from the velocities of half a step h
+            before: h/2 times the power of internal forces and weight is added, and in free flight
+            m (h g)^2 / 8. The sum of all energies is then constant for a linear material in free
+            flight, and a contact impulse p changes it by p . (v + v') / 2, v and v' the velocities
+            before and after the step: not at all while the contact stays closed
         elastic: energy [J]
         gravitational: energy against the origin [J]
-        momentum: [kg m/s], shape (3,)
-        angular_momentum: about the origin [kg m^2/s], shape (3,)
+        momentum: at the time of the positions [kg m/s], shape (3,)
+        angular_momentum: the same about the origin [kg m^2/s], shape (3,)
         overlap: deepest overlap of a vertex or an edge [m]
         overlap_pair: labels of its bodies, None without overlap
         n_contacts: contacts in the last step
@@ -83,16 +83,21 @@ class Meter:
         self.model = model
         self.mass = model.mass.numpy().astype(np.float64)
         self.names = [*model.labels, *(f"plane{p}" for p in range(model.n_plane))]
-        self._tets = model.tets.numpy()
+        self._tets, self._body = model.tets.numpy(), model.vert_body.numpy()
         self._volume = model.volume.numpy()
         self._trees = Trees(model)
         self.tunnelling = Tunnelling(model, self.names, self._trees)
 
-    def measure(self, state: State, work: Work, duration: float, dt: float) -> Measure:
-        """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s]."""
+    def measure(
+        self, state: State, v: np.ndarray, work: Work, duration: float, dt: float
+    ) -> Measure:
+        """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s].
+
+        ``v`` are its velocities at the time of the positions [m/s], shape (n_vert, 3).
+        """
         model = self.model
         x = state.x.numpy().astype(np.float64)
-        v = state.v.numpy().astype(np.float64)
+        v = v.astype(np.float64)
         energy = wp.zeros(model.n_tet, dtype=float)
         energies(model, state.x, energy)
         p = self.mass[:, None] * v
@@ -100,7 +105,7 @@ class Meter:
         self.tunnelling.follow(state.x)
         overlap, pair, unheld = self.overlap(state.x, work)
         return Measure(
-            kinetic=float(0.5 * (p * v).sum() + 0.5 * dt * (self._forces(state.x) * v).sum()),
+            kinetic=self._kinetic(state, work, dt),
             elastic=float(energy.numpy().sum(dtype=np.float64)),
             gravitational=float(-(self.mass @ x) @ np.array(model.gravity)),
             momentum=p.sum(axis=0),
@@ -115,6 +120,18 @@ class Meter:
             unheld=unheld if duration > 0.0 else 0,
             forces=self.forces(work, duration),
         )
+
+    def _kinetic(self, state: State, work: Work, dt: float) -> float:
+        """Kinetic energy [J], see ``Measure``."""
+        v = state.v.numpy().astype(np.float64)
+        lagging = 0.5 * (self.mass[:, None] * v * v).sum()
+        power = (self._forces(state.x) * v).sum()
+        pair = _contacts(work)["pair"]
+        mass = np.bincount(self._body, self.mass)
+        mass[np.unique(pair[pair < len(mass)])] = 0.0
+        mass[self._body[self.model.inv_mass.numpy() == 0.0]] = 0.0
+        fall = mass.sum() * np.square(self.model.gravity).sum()
+        return float(lagging + 0.5 * dt * power + 0.125 * dt * dt * fall)
 
     def _forces(self, x: wp.array) -> np.ndarray:
         """Internal forces and weight [N] of the mobile vertices, shape (n_vert, 3)."""

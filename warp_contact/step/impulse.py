@@ -8,6 +8,7 @@ from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.switches import on
+from warp_contact.data.warm_start import forget as forget_last
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import constraint, pair_impulses
 from warp_contact.kernels.impulse import impulse as kernels
@@ -51,7 +52,7 @@ def forget(work: Work) -> None:
     work.contacts.n_vertex.zero_()
     work.narrow_phase.n_crossing.zero_()
     work.contacts.n.zero_()
-    warm_start.forget(work)
+    forget_last(work.warm)
 
 
 def begin(model: Model, x0: wp.array, work: Work) -> None:
@@ -64,10 +65,17 @@ def exchange(model: Model, v: wp.array, work: Work) -> None:
 
     The contacts of edges are kept, with their impulses, for the next step.
     """
-    sweeps.repeat(work, _sweep, model, v, work)
-    sweeps.count(work)
-    _sweep(model, v, work, last=True)
+    _sweep_all(model, v, work)
     warm_start.keep_edges(work)
+
+
+def solve_half_step(model: Model, state: State, work: Work) -> None:
+    """As ``solve`` for half a step, of which nothing is kept for the next one."""
+    begin(model, state.x, work)
+    warm_start.recall_edges(work, share=0.5)
+    warm_start.recall_vertices(work, share=0.5)
+    apply(model, state.v, work)
+    _sweep_all(model, state.v, work)
 
 
 def apply(model: Model, v: wp.array, work: Work) -> None:
@@ -90,6 +98,12 @@ def add_forces(work: Work) -> None:
         inputs=[forces.unit, c.n, c.record, c.impulse],
         outputs=[forces.pair_key, forces.pair_total, work.overflow.pairs],
     )
+
+
+def _sweep_all(model: Model, v: wp.array, work: Work) -> None:
+    sweeps.repeat(work, _sweep, model, v, work)
+    sweeps.count(work)
+    _sweep(model, v, work, last=True)
 
 
 def _solve_from_last(model: Model, state: State, work: Work) -> None:

@@ -10,6 +10,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.motion import motion
+from warp_contact.step.damping import remember_contacts
 from warp_contact.step.other_responses import step_literal, step_penalty, step_predicted
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.step.step import step, step_overlapping
@@ -35,4 +36,6 @@ def step_of(response: ContactSurface | Penalty | PredictedForce, overlapping: bo
 
 def _take_one(model: Model, state: State, work: Work, damping_stages: int, one: Callable) -> None:
     one(model, state, work, damping_stages)
+    if work.damping:
+        remember_contacts(model, state, work.damping)
     wp.launch(motion.count_down, dim=1, inputs=[work.overflow.all], outputs=[work.steps])

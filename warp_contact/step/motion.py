@@ -3,41 +3,28 @@
 import warp as wp
 
 from warp_contact.data.model import Model
-from warp_contact.data.state import State
+from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work
 from warp_contact.kernels.motion import motion
-from warp_contact.step.forces import damp, internal_forces
+from warp_contact.step.damping import kick_damped
+from warp_contact.step.forces import internal_forces
 
 
 def predict(model: Model, state: State, work: Work, damping_stages: int) -> None:
-    """Damp ``state.v`` in so many stages, kick it, set ``work.x`` = x + h v.
-
-    In this order: damping after the kick would pass the load of vertices at rest in a contact on to
-    their neighbours before the impulses act, and the state at rest would depend on the damping.
-    """
+    """Let forces, weight and damping act on ``state.v`` for a step; set ``work.x`` = x + h v."""
     if damping_stages > 0:
-        scratch, inv_mass = (work.v, work.surface.s), work.awake.inv_mass
-        damp(
-            model,
-            state.x,
-            state.v,
-            inv_mass,
-            work.dt,
-            work.f_tet,
-            scratch,
-            damping_stages,
-            work.share,
-        )
-    kick(model, state, work)
+        kick_damped(model, state, work, damping_stages)
+    else:
+        kick(model, state, work, work.awake)
 
 
-def kick(model: Model, state: State, work: Work) -> None:
+def kick(model: Model, state: State, work: Work, awake: Awake) -> None:
     """Add the acceleration over ``work.dt`` to ``state.v``, and set ``work.x`` = x + h v."""
-    internal_forces(model, state.x, work.awake.tets, work.f_tet)
+    internal_forces(model, state.x, awake.tets, work.f_tet)
     wp.launch(
         motion.kick,
         dim=model.n_vert,
-        inputs=[model.vt_start, model.vt_corner, work.f_tet, work.awake.inv_mass]
+        inputs=[model.vt_start, model.vt_corner, work.f_tet, awake.inv_mass]
         + [wp.vec3(*model.gravity), work.dt, state.x, state.v],
         outputs=[work.x, state.v],
     )

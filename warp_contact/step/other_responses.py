@@ -8,8 +8,9 @@ from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import penalty, predicted
 from warp_contact.step import broad_phase, impulse, residual, search
+from warp_contact.step.damping import damp_alone
 from warp_contact.step.detection import detect, detect_vertices
-from warp_contact.step.motion import drift, predict
+from warp_contact.step.motion import drift, kick, predict
 from warp_contact.step.response import Penalty
 
 
@@ -30,10 +31,16 @@ def step_literal(
 def step_penalty(
     model: Model, state: State, work: Work, damping_stages: int, response: Penalty
 ) -> None:
-    """Penalty forces, at the positions at the start of the step."""
+    """Penalty forces, at the positions at the start of the step.
+
+    They are no impulses that answer to a load, so that none can be expected of the next step, and
+    the damping acts alone, before all forces: the state at rest must not depend on it.
+    """
     broad_phase.refresh(model, state.x, state.x, work)
     detect(model, state.x, state.x, work)
-    predict(model, state, work, damping_stages)
+    if damping_stages > 0:
+        damp_alone(model, state, work, damping_stages)
+    kick(model, state, work, work.awake)
     if_any(work.contacts.n, _push, model, state, work, response)
     impulse.add_forces(work)
     drift(model, state, work, state.x)
@@ -47,6 +54,12 @@ def step_predicted(model: Model, state: State, work: Work, damping_stages: int) 
     if_any(work.contacts.n, _push_apart, model, state, work)
     impulse.add_forces(work)
     drift(model, state, work, state.x)
+
+
+def push_half_step(model: Model, now: State, work: Work, response: Penalty) -> None:
+    """Add what the penalty forces at ``now.x`` add to ``now.v`` in half a step."""
+    detect(model, now.x, now.x, work)
+    if_any(work.contacts.n, _push, model, now, work, response)
 
 
 def _push(model: Model, state: State, work: Work, response: Penalty) -> None:

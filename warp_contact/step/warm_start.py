@@ -5,24 +5,24 @@ from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import warm_start as kernels
 
 
-def recall_vertices(work: Work) -> None:
-    """Start the contacts of vertices from the last step; set the parts of all contacts."""
+def recall_vertices(work: Work, share: float = 1.0) -> None:
+    """Start the contacts of vertices from a share of the last step; set the parts of all."""
     c = work.contacts
     launch_over(
         kernels.recall_vertices,
         work.capacity.contacts,
-        inputs=[c.n_vertex, c.n, c.record, c.constraint, work.warm.partner, work.warm.kept],
+        inputs=[share, c.n_vertex, c.n, c.record, c.constraint, work.warm.partner, work.warm.kept],
         outputs=[c.impulse, c.part],
     )
 
 
-def recall_edges(work: Work) -> None:
-    """Start the contacts of edges from the impulses that they have."""
+def recall_edges(work: Work, share: float = 1.0) -> None:
+    """Start the contacts of edges from a share of the impulses that they have."""
     c, n = work.contacts, work.narrow_phase
     launch_over(
         kernels.recall_edges,
         work.capacity.contacts,
-        inputs=[c.n_vertex, c.n, c.record, c.constraint, n.source, n.found],
+        inputs=[share, c.n_vertex, c.n, c.record, c.constraint, n.source, n.found],
         outputs=[c.impulse],
     )
 
@@ -53,9 +53,3 @@ def keep_edges(work: Work) -> None:
 def forget_edges(work: Work) -> None:
     """The next step has no persistent contacts of edges."""
     work.warm.n_edge.zero_()
-
-
-def forget(work: Work) -> None:
-    """The next step has no impulses to start from."""
-    work.warm.partner.fill_(-1)
-    forget_edges(work)

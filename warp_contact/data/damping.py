@@ -1,0 +1,78 @@
+"""What the damping of a step needs, and how contacts changed the velocities in the last steps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warp_contact.data.model import Model
+
+MOST = 256  # stages of a step: more would take longer than any frame is worth
+
+
+@dataclass
+class Damping:
+    """Only of scenes with a damped body.
+
+    Attributes:
+        coef: coefficients of the polynomial [-], shape (MOST,)
+        reach: largest step times eigenvalue that it is good for [-], shape (1,)
+        last: change of the velocities by contacts in the last step [m/s], shape (n_vert,)
+        before: the same in the step before it [m/s], shape (n_vert,)
+        free: velocities in this step before the contacts [m/s], shape (n_vert,)
+        even, odd: terms of the polynomial [m/s], shape (n_vert,)
+    """
+
+    coef: wp.array[float]
+    reach: wp.array[float]
+    last: wp.array[wp.vec3]
+    before: wp.array[wp.vec3]
+    free: wp.array[wp.vec3]
+    even: wp.array[wp.vec3]
+    odd: wp.array[wp.vec3]
+
+
+def allocate(model: Model) -> Damping | None:
+    """Allocate before any step; None where no body is damped."""
+    if not any(e.damped for e in model.elements):
+        return None
+    vectors = [wp.zeros(model.n_vert, dtype=wp.vec3) for _ in range(5)]
+    return Damping(wp.zeros(MOST, dtype=float), wp.ones(1, dtype=float), *vectors)
+
+
+def copied(d: Damping | None) -> tuple[wp.array, ...]:
+    """What a step needs of the ones before, in arrays of its own."""
+    return (wp.clone(d.last), wp.clone(d.before)) if d else ()
+
+
+def copy(to: Damping | None, of: tuple[wp.array, ...]) -> None:
+    """Put back what was ``copied``."""
+    if to:
+        wp.copy(to.last, of[0])
+        wp.copy(to.before, of[1])
+
+
+def keep(of: tuple[wp.array, ...], d: Damping | None) -> None:
+    """Overwrite what was ``copied`` with what is now."""
+    if d:
+        wp.copy(of[0], d.last)
+        wp.copy(of[1], d.before)
+
+
+def forget(d: Damping | None, vertices: slice = slice(None)) -> None:
+    """Nothing has touched."""
+    if d:
+        d.last[vertices].zero_()
+        d.before[vertices].zero_()
+
+
+def values(d: Damping | None) -> dict[str, np.ndarray]:
+    """What a checkpoint needs of it."""
+    return {"last": d.last.numpy(), "before": d.before.numpy()} if d else {}
+
+
+def restore(d: Damping | None, stored: dict[str, np.ndarray]) -> None:
+    """Take over the ``values`` of another one."""
+    if d:
+        d.last.assign(stored["last"])
+        d.before.assign(stored["before"])

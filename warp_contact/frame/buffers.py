@@ -1,0 +1,76 @@
+"""The buffers of the steps, and the graphs that are captured on them."""
+
+import numpy as np
+import warp as wp
+
+from warp_contact.data.model import Model
+from warp_contact.data.overflow import Capacity
+from warp_contact.data.state import Awake, State
+from warp_contact.data.work import Work, allocate_work
+from warp_contact.step.loop import step_of, take_steps
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+
+NEIGHBOURS = 8  # initial capacity: pairs with a contact force for each body
+IMPULSE_UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
+
+
+class Buffers:
+    """What a step fills, replaced by larger ones where a frame has outgrown it.
+
+    Attributes:
+        work: buffers, with the contacts of the last step; missing only while they are replaced
+        response: how bodies respond to contact
+        unit: resolution of the recorded contact impulses [N s]
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        state: State,
+        response: ContactSurface | Penalty | PredictedForce,
+        awake: Awake | None,
+    ):
+        """Allocate on the current device; ``awake`` is what moves, None for everything."""
+        self._model, self._state, self._awake = model, state, awake
+        self.response = response
+        inv_mass = model.inv_mass.numpy()
+        mobile = float(model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
+        self.unit = IMPULSE_UNIT * (mobile if mobile > 0.0 else 1.0)
+        pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
+        self.work: Work = self._allocate(Capacity(pairs=pairs))
+        self._graphs: dict[tuple[int, bool], wp.Graph] = {}
+
+    def use(self, work: Work) -> None:
+        """Continue with other buffers."""
+        self.work = work
+        work.forces.unit = self.unit
+        self._graphs.clear()
+
+    def replace(self, capacity: Capacity) -> None:
+        """Free the buffers, then allocate: old and new ones at once would be the peak of memory."""
+        before = self.work.capacity
+        self._graphs.clear()
+        del self.work
+        try:
+            self.work = self._allocate(capacity)
+        except RuntimeError:  # there is no memory for it
+            self.work = self._allocate(before)
+            raise
+
+    def mend(self, n_pair: int) -> None:
+        """Allocate anew, for ``n_pair`` pairs, where an interrupt came while they were replaced."""
+        if not hasattr(self, "work"):
+            self.work = self._allocate(Capacity(pairs=n_pair))
+
+    def graph(self, damping_stages: int, overlapping: bool) -> wp.Graph:
+        """The captured steps of a frame, with so many stages of damping."""
+        key = damping_stages, overlapping
+        if key not in self._graphs:
+            one = step_of(self.response, overlapping)
+            with wp.ScopedCapture() as capture:
+                take_steps(self._model, self._state, self.work, damping_stages, one)
+            self._graphs[key] = capture.graph
+        return self._graphs[key]
+
+    def _allocate(self, capacity: Capacity) -> Work:
+        return allocate_work(self._model, self._state, capacity, self._awake, self.unit)

@@ -1,0 +1,62 @@
+"""Velocities at the time of the positions.
+
+Those of symplectic Euler belong to the middle of a step: ``State.v`` is half a step behind
+``State.x``. The other half step brings them to its time, as in velocity Verlet: forces and weight
+act, and contacts answer: impulses keep what touches from approaching (Andersen 1983, RATTLE).
+"""
+
+from collections.abc import Callable
+from functools import partial
+
+import warp as wp
+
+from warp_contact.data.launch import if_any
+from warp_contact.data.model import Model
+from warp_contact.data.state import Awake, State
+from warp_contact.data.work import Work
+from warp_contact.step import broad_phase, impulse, narrow_phase
+from warp_contact.step.detection import detect
+from warp_contact.step.motion import kick
+from warp_contact.step.other_responses import push_half_step
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+
+
+def velocities_now(model: Model, state: State, work: Work, dt: float, answer: Callable) -> wp.array:
+    """Velocities [m/s] at the time of ``state.x``, shape (n_vert,), after steps ``dt`` [s].
+
+    ``answer`` is that of ``answer_of``. The contacts in ``work`` and the forces of the frame
+    change; where they did not fit, see ``work.overflow``, the result is none.
+    """
+    now = State(state.x, wp.clone(state.v))
+    if dt > 0.0:
+        work.dt.fill_(0.5 * dt)
+        work.overflow.all.zero_()
+        kick(model, now, work, work.awake)
+        broad_phase.refresh(model, state.x, work.x, work)
+        if_any(work.broad_phase.any_pair, answer, model, now, work)
+    return now.v
+
+
+def shift_velocities(model: Model, state: State, work: Work, awake: Awake, time: float) -> None:
+    """Let ``state.v`` of what is ``awake`` belong to ``time`` [s] later, without contacts."""
+    if time != 0.0:
+        work.dt.fill_(time)
+        kick(model, state, work, awake)
+
+
+def answer_of(response: ContactSurface | Penalty | PredictedForce, apart: bool) -> Callable:
+    """How contacts answer the half step; ``apart`` where nothing overlaps."""
+    if isinstance(response, Penalty):
+        return partial(push_half_step, response=response)
+    return _answer_apart if apart else _answer
+
+
+def _answer_apart(model: Model, now: State, work: Work) -> None:
+    narrow_phase.find_entered_vertices(model, now.x, work.x, work)
+    narrow_phase.continue_edges(model, now.x, work)
+    if_any(work.contacts.n, impulse.solve_half_step, model, now, work)
+
+
+def _answer(model: Model, now: State, work: Work) -> None:
+    detect(model, now.x, now.x, work)
+    if_any(work.contacts.n, impulse.solve_half_step, model, now, work)

@@ -15,6 +15,7 @@ CLOSURE_TOLERANCE = wp.constant(1.0e-4)  # a smaller overlap is left to the rest
 REST_GAP = wp.constant(2.0e-4)  # resting gap: rounding does not decide which vertex is inside
 FLUSH_EDGE = wp.constant(2.0e-4)  # an edge this deep lies in the face, whatever its direction
 VERTEX_MARGIN = wp.constant(1.0e-3)  # speculative: a vertex this close makes a contact with a gap
+SELF_DEEP = wp.constant(1.0e-3)  # a body overlaps itself by more: rounding puts no vertex so deep
 OLD_OVERLAP = wp.constant(1.0e-3)  # at the start of a step: a deeper one is for the search
 SAME_PLACE = wp.constant(1.0e-3)  # surfaces closer than this show no overlap to search
 STALE_OVERLAP = wp.constant(2.0e-3)  # at the start of a step: a deeper one means a wrong direction

@@ -31,10 +31,14 @@ class Progress:
             return
         self.written = now
         left = (now - self.start) / self.done * (self.n_frames - self.done)
+        itself = measured.self_overlap
+        overlap = f"overlap {measured.overlap:.1e} m  "
+        overlap += f"self-overlap {itself:.1e} m  " if itself > 0.0 else ""
         self._write(
             f"frame {sim.frame} ({self.done}/{self.n_frames})  t {sim.time:.3f} s  "
             f"{sim.substeps} steps  {measured.n_contacts} contacts  "
-            f"overlap {measured.overlap:.1e} m  " + ("done" if last else f"{clock(left)} to go")
+            + overlap
+            + ("done" if last else f"{clock(left)} to go")
         )
 
     def close(self) -> None:

@@ -221,9 +221,9 @@ def at(frame: int, time: float) -> SimpleNamespace:
     return SimpleNamespace(frame=frame, time=time, substeps=7)
 
 
-def found(n_contacts: int, overlap: float) -> SimpleNamespace:
+def found(n_contacts: int, overlap: float, itself: float = 0.0) -> SimpleNamespace:
     """What it reads of a measurement."""
-    return SimpleNamespace(n_contacts=n_contacts, overlap=overlap)
+    return SimpleNamespace(n_contacts=n_contacts, overlap=overlap, self_overlap=itself)
 
 
 def test_progress_is_one_line_on_a_terminal():
@@ -231,12 +231,12 @@ def test_progress_is_one_line_on_a_terminal():
     announce("loading", stream=stream)
     with Progress(2, stream=stream) as line:
         line.update(at(1, 1 / 60), found(12, 3.4e-5))
-        line.update(at(2, 2 / 60), found(9, 0.0))
+        line.update(at(2, 2 / 60), found(9, 0.0, 0.02))
     text = stream.getvalue()
     assert text.startswith("loading\n")
     assert text.count("\n") == 2
     assert "frame 1 (1/2)  t 0.017 s  7 steps  12 contacts  overlap 3.4e-05 m  0:00 to go" in text
-    assert text.rstrip().endswith("done")
+    assert text.rstrip().endswith("overlap 0.0e+00 m  self-overlap 2.0e-02 m  done")
 
 
 @pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])

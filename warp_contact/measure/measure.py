@@ -11,6 +11,7 @@ from warp_contact.data.work import Work
 from warp_contact.kernels.lengths import UNHELD
 from warp_contact.kernels.motion import motion
 from warp_contact.kernels.output import measure as kernels
+from warp_contact.kernels.output import self_overlap as own
 from warp_contact.measure.trees import Trees
 from warp_contact.measure.tunnelling import Tunnelling
 from warp_contact.scene import topology
@@ -33,6 +34,10 @@ class Measure:
         angular_momentum: the same about the origin [kg m^2/s], shape (3,)
         overlap: deepest overlap of a vertex or an edge [m]
         overlap_pair: labels of its bodies, None without overlap
+        self_overlap: deepest overlap of a vertex or an edge with its own body, folded or of several
+            pieces [m]; at most the thickness of what went in. Nothing holds it: contact is between
+            different bodies only. What belongs to an inverted tet is left out
+        self_overlap_body: label of this body, None without self-overlap
         n_contacts: contacts in the last step
         volume_ratio: smallest volume of a tet over its rest volume
         inverted: tets that are inside out or flat
@@ -57,6 +62,8 @@ class Measure:
     angular_momentum: np.ndarray
     overlap: float
     overlap_pair: tuple[str, str] | None
+    self_overlap: float
+    self_overlap_body: str | None
     n_contacts: int
     volume_ratio: float
     inverted: int
@@ -104,6 +111,7 @@ class Meter:
         ratio = topology.signed_volumes(x, self._tets) / self._volume
         self.tunnelling.follow(state.x)
         overlap, pair, unheld = self.overlap(state.x, work)
+        self_overlap, folded = self.self_overlap(state.x)
         return Measure(
             kinetic=self._kinetic(state, work, dt),
             elastic=float(energy.numpy().sum(dtype=np.float64)),
@@ -112,6 +120,8 @@ class Meter:
             angular_momentum=np.cross(x, p).sum(axis=0),
             overlap=overlap,
             overlap_pair=pair,
+            self_overlap=self_overlap,
+            self_overlap_body=folded,
             n_contacts=int((_contacts(work)["coef"] != 0.0).any(1).sum()),
             volume_ratio=float(ratio.min()),
             inverted=int((ratio <= 0.0).sum()),
@@ -189,6 +199,31 @@ class Meter:
         deep = awake & (depth > UNHELD * model.body_edge.numpy()[own])
         unheld = np.setdiff1d(first[: model.n_surf][deep[: model.n_surf]], _held(work))
         return float(depth[k]), (self.names[own[k]], self.names[partner[k]]), len(unheld)
+
+    def self_overlap(self, x: wp.array) -> tuple[float, str | None]:
+        """Deepest overlap of a body with itself [m], and its label; after ``overlap`` of that x."""
+        model = self.model
+        trees = self._trees
+        at_vert, at_edge = (wp.zeros(n, dtype=float) for n in (model.n_surf, model.n_edge))
+        tets = trees.volumes.id, trees.mesh
+        wp.launch(
+            own.vertex_self_overlaps,
+            dim=model.n_surf,
+            inputs=[*tets, model.surf, model.body_world, x],
+            outputs=[at_vert],
+        )
+        wp.launch(
+            own.edge_self_overlaps,
+            dim=model.n_edge,
+            inputs=[*tets, model.body_world, x],
+            outputs=[at_edge],
+        )
+        depth = np.concatenate([at_vert.numpy(), at_edge.numpy()])
+        first = np.concatenate([model.surf.numpy(), model.edges.numpy()[:, 0]])
+        k = int(depth.argmax())
+        if depth[k] <= 0.0:
+            return 0.0, None
+        return float(depth[k]), self.names[model.vert_body.numpy()[first[k]]]
 
 
 def _contacts(work: Work) -> np.ndarray:

@@ -29,6 +29,11 @@ class ContactSurface:
 class Penalty:
     """A force proportional to the penetration depth (Heidelberger et al. 2004).
 
+    Bodies sink in by the load over ``stiffness`` and the number of contacts, and they rock and
+    bounce on these springs, which the damping of their materials hardly reaches. The force of a
+    frame is then the weight and the change of momentum, so it swings about the weight for long, and
+    further with a lower stiffness: compare means over many frames, or give some ``damping``.
+
     Attributes:
         stiffness: force per depth of each contact [N/m]
         damping: force per normal velocity of each contact [N s/m]

@@ -8,6 +8,7 @@ import warp as wp
 
 from warp_contact.kernels.broad_phase.bounds import next_in
 from warp_contact.kernels.geometry import tet_weights
+from warp_contact.kernels.lengths import FLUSH
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.surface_query import closest_hit, first_crossing, inner_side
 from warp_contact.kernels.options import OPTIONS
@@ -63,10 +64,13 @@ def vertex_overlaps(
     while q >= 0:
         t = mesh.tets[q]
         body = mesh.vert_body[t[0]]
-        if body != own and wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]])) >= 0.0:
+        least = wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]]))
+        if body != own and least >= -FLUSH:  # rounding puts it out of all tets that share a face
             root = wp.bvh_get_group_root(mesh.bvh, body)
             hit = closest_hit(mesh.bvh, root, mesh.tris, x, p, 0.1 * mesh.body_edge[body])
-            if hit.t > overlap[k]:
+            flush = FLUSH * mesh.body_edge[body]
+            inside = least >= 0.0 or inner_side(hit, mesh.tris, x, p) > flush
+            if inside and hit.t > overlap[k]:
                 overlap[k] = hit.t
                 partner[k] = body
         q = next_in(volumes, world, p, p, q)

@@ -9,6 +9,7 @@ floor of a pile, has no list: its parts query the Bvh over the bodies.
 
 import warp as wp
 
+from warp_contact.kernels.broad_phase.pairs import all_fit
 from warp_contact.kernels.geometry import boxes_meet
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.options import OPTIONS
@@ -213,7 +214,7 @@ def near_parts(
             out.tri_lower = lo
             out.tri_upper = hi
             first = wp.atomic_add(count, 0, n)
-            if first + n > near_tri.shape[0]:
+            if first < 0 or n > near_tri.shape[0] - first:  # as ``append`` of pairs.py
                 part_of[m, k] = out
                 return
             out.tris = wp.vec2i(first, first + n)
@@ -230,8 +231,7 @@ def fits(
     needed: wp.array[int],  # (1,) largest number that did not fit
 ):
     """One thread: report the count if it did not fit, and reset it."""
-    if count[0] > capacity:
-        wp.atomic_max(needed, 0, count[0])
+    all_fit(count[0], capacity, needed)
     count[0] = 0
 
 

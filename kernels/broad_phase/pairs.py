@@ -12,6 +12,8 @@ from warp_contact.kernels.sorting import sort
 
 wp.set_module_options(OPTIONS)
 
+MOST = wp.constant(2**31 - 1)  # stands for a count beyond it
+
 
 @wp.struct
 class PairList:
@@ -28,8 +30,17 @@ class PairList:
 def append(owner: int, item: int, found: wp.array[wp.vec2i], n_found: wp.array[int]):
     """Append to a list; an entry that does not fit is only counted."""
     k = wp.atomic_add(n_found, 0, 1)
-    if k < found.shape[0]:
+    if k >= 0 and k < found.shape[0]:  # a body that explodes may count beyond 2^31, to -2^31
         found[k] = wp.vec2i(owner, item)
+
+
+@wp.func
+def all_fit(n: int, capacity: int, needed: wp.array[int]) -> bool:
+    """Whether so many entries fit, or ``needed`` is set; a count that came round does not."""
+    if n >= 0 and n <= capacity:
+        return True
+    wp.atomic_max(needed, 0, wp.where(n < 0, MOST, n))
+    return False
 
 
 @wp.kernel
@@ -43,8 +54,7 @@ def count_items(
     needed: wp.array[int],  # (1,) largest number of items that did not fit
 ):
     """For each item: count it for its owner; none is counted when they do not fit."""
-    if n_found[0] > found.shape[0]:
-        wp.atomic_max(needed, 0, n_found[0])
+    if not all_fit(n_found[0], found.shape[0], needed):
         return
     for k in range(wp.tid(), n_found[0], threads):
         wp.atomic_add(count, found[k][0], 1)

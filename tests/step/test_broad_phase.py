@@ -5,6 +5,9 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, box
+from warp_contact.kernels.broad_phase import hashing
+from warp_contact.kernels.broad_phase import near as near_kernels
+from warp_contact.kernels.broad_phase import pairs as pair_kernels
 from warp_contact.step import broad_phase
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -128,3 +131,20 @@ def test_pairs_kept_for_many_steps_give_the_same_bits_as_new_ones(pile, monkeypa
         np.testing.assert_array_equal(kept.positions(), renewed.positions())
         np.testing.assert_array_equal(kept.velocities(), renewed.velocities())
     assert rebuilt > 5
+
+
+def test_a_count_beyond_two_to_the_31_writes_nowhere_and_asks_for_room():
+    """On its way round it is negative: an index that a check against the capacity lets pass."""
+    n, many = 5, 2**31 - 3
+    x = wp.zeros(n, dtype=wp.vec3)  # below a plane at z = 1
+    plane = wp.array([[0.0, 0.0, 1.0]], dtype=wp.vec3), wp.array([1.0], dtype=float)
+    body = [wp.zeros(1, dtype=float), wp.full(1, 1, dtype=int), wp.array(np.arange(n), dtype=int)]
+    found, n_found = wp.zeros(4, dtype=wp.vec2i), wp.full(1, many, dtype=int)
+    inputs = [7, *body, wp.zeros(n, dtype=int), *plane, x]
+    wp.launch(hashing.visit_planes, dim=n, inputs=inputs, outputs=[found, n_found])
+    assert n_found.numpy()[0] == many + n - 2**32 and not found.numpy().any()
+    count, needed = wp.zeros(n + 1, dtype=int), wp.zeros(1, dtype=int)
+    wp.launch(pair_kernels.count_items, dim=1, inputs=[1, n_found, found], outputs=[count, needed])
+    assert needed.numpy()[0] > 2**30 and not count.numpy().any()
+    wp.launch(near_kernels.fits, dim=1, inputs=[4], outputs=[n_found, needed])
+    assert needed.numpy()[0] > 2**30 and n_found.numpy()[0] == 0

@@ -10,6 +10,7 @@ KERNELS = sorted((ROOT / "kernels").rglob("*.py"))
 SECTIONS = ("in", "in, out", "out", "out, added to")
 ARGUMENTS = 10  # of a kernel
 WIDE = 8  # kernels that may have more
+SUMS = "wp.atomic_add", "wp.atomic_sub"
 
 
 def is_warp(node: ast.AST, name: str) -> bool:
@@ -208,3 +209,16 @@ def test_no_query_begins_before_another_has_ended():
                 inside = set().union(*(called(statement) for statement in loop.body))
                 assert not inside & (begin | asking), name
     assert loops > 5
+
+
+def test_only_integers_are_summed_by_atomics():
+    """Threads race: a sum of floats in another order has other bits."""
+    summed = set()
+    for path in KERNELS:
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.FunctionDef):
+                kinds = {a.arg: ast.unparse(a.annotation) for a in function.args.args}
+                for node in ast.walk(function):
+                    if isinstance(node, ast.Call) and ast.unparse(node.func) in SUMS:
+                        summed.add(kinds[root(node.args[0])])
+    assert summed == {"wp.array[int]", "wp.array2d[wp.int64]"}

@@ -7,7 +7,7 @@ the next one. A corner of an inverted tet is left out: it lies in a neighbour wi
 
 The depth is the distance to the closest triangle that lies behind: one that does not look where the
 vertex or the edge looks, and that has it on its inner side. So it is at most the thickness of what
-went in.
+went in. Beyond some edges it is that along the normal, as a body may overlap itself as a whole.
 """
 
 import warp as wp
@@ -21,6 +21,7 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
+DOUBLINGS = wp.constant(6)  # of the radius of a query, to 3.2 edges: a body may overlap as a whole
 ASIDE = wp.constant(0.1)  # cosine between normals up to which two faces do not look the same way
 
 
@@ -103,6 +104,18 @@ def is_in_itself(
 
 
 @wp.func
+def lies_behind(
+    t: wp.vec3i, x: wp.array[wp.vec3], p: wp.vec3, n: wp.vec3, flush: float, i: int, j: int
+) -> bool:
+    """Whether triangle t does not look along n, and p is on its inner side or flush with it."""
+    face = area_vector(x[t[0]], x[t[1]], x[t[2]])
+    size = wp.length(face)
+    if wp.dot(n, face) >= ASIDE * size or wp.dot(p - x[t[0]], face) >= flush * size:
+        return False
+    return not (touches(t, i) or touches(t, j))
+
+
+@wp.func
 def way_out(
     mesh: Mesh,
     x: wp.array[wp.vec3],
@@ -111,7 +124,10 @@ def way_out(
     i: int,  # p is the vertex i, or on the edge from i to j
     j: int,
 ) -> float:
-    """Distance of p to the closest triangle of its body that lies behind it [m], 0 for none."""
+    """Distance of p to the closest triangle of its body that lies behind it [m].
+
+    If that is more than some edges, the distance to the plane of the first one along -n.
+    """
     best = Hit()
     best.tri = -1
     best.t = NONE
@@ -120,20 +136,26 @@ def way_out(
     flush = SELF_DEEP * mesh.body_edge[body]
     root = wp.bvh_get_group_root(mesh.bvh, body)
     radius = 0.1 * mesh.body_edge[body]
-    for _attempt in range(20):
+    for _attempt in range(DOUBLINGS):
         grow = wp.vec3(radius, radius, radius)
         query = wp.bvh_query_aabb(mesh.bvh, p - grow, p + grow, root)
         while wp.bvh_query_next(query, k):
-            t = mesh.tris[k]
-            face = area_vector(x[t[0]], x[t[1]], x[t[2]])
-            size = wp.length(face)
-            if wp.dot(n, face) < ASIDE * size and wp.dot(p - x[t[0]], face) < flush * size:
-                if not (touches(t, i) or touches(t, j)):
-                    best = closer(best, k, mesh.tris, x, p)
+            if lies_behind(mesh.tris[k], x, p, n, flush, i, j):
+                best = closer(best, k, mesh.tris, x, p)
         if best.t <= radius:
             return best.t
         radius = 2.0 * radius
-    return 0.0
+    ahead = float(NONE)
+    depth = 0.5 * radius  # nothing closer was found
+    ray = wp.bvh_query_ray(mesh.bvh, p, -n, root)
+    while wp.bvh_query_next(ray, k, ahead):
+        t = mesh.tris[k]
+        h = segment_hit(p, -n, x[t[0]], x[t[1]], x[t[2]], PARALLEL)
+        if h[0] >= 0.0 and h[0] < ahead and lies_behind(t, x, p, n, flush, i, j):
+            ahead = h[0]
+            face = wp.normalize(area_vector(x[t[0]], x[t[1]], x[t[2]]))
+            depth = wp.max(0.5 * radius, wp.dot(x[t[0]] - p, face))
+    return depth
 
 
 @wp.func

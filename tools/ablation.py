@@ -90,6 +90,7 @@ _rows = {
     "closure": ("closure", switch("closure"), parts.CORNERS),
     "look": ("second look, after the closure", switch("second look"), parts.FINE),
     "closure torque": ("torque of the closure", switch("closure torque"), parts.TURNED),
+    "search spin": ("spin that the search leaves", switch("search spin"), parts.PARTED),
     "strays": ("vertices that left their triangles", switch("strays"), parts.FINE),
     "entry": ("back by the side it came in by", kernel(vertex_contact, "ASTRAY", 0.0), parts.RIM),
     "deep end": ("edges led out by their deep end", _deep_end, parts.ASIDE),

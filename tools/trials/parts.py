@@ -51,6 +51,7 @@ PLACE = Quantity("place of the surface [% of the overlap]", 1.0)
 SWEEPS = Quantity("sweeps of the impulses in a step", 1.0)
 TIME = Quantity("processor time of 20 frames [s]", 0.0)
 TIMES = 3  # runs for a time
+TURN = 0.1, 0.2, 0.0, 0.97  # about the x and y axes
 
 
 def collide(figure: Quantity, scene: wc.Scene, steps: int = 0) -> float:
@@ -182,6 +183,16 @@ def tilted(figure: Quantity, cells: int, place: str = "tilted", **turned) -> flo
     return collide(figure, collision.build(cells, cells, 1.0, place, **turned))
 
 
+def parted() -> float:
+    """Angular momentum of tilted blocks that the search leads apart; they start at rest."""
+    blocks = body(wc.box(1.0, 2), soft()), body(wc.box(1.0, 3), soft(), (0.2, 0.1, 0.8), TURN)
+    sim = wc.Simulation(scene(*blocks, gravity=NONE), fps=240)
+    for _ in sim.frames(12):
+        pass
+    _, spin, _, scale = collision.motion(sim)
+    return float(np.linalg.norm(spin)) / scale
+
+
 def rim(figure: Quantity, friction: float) -> float:
     """Of 200 random draws of 3:3 and 2:5 cells, one of six that need what this is to show."""
     angles, shift = (161.0, 219.0, 204.0), np.array([0.015, 0.019, 0.0])
@@ -210,6 +221,7 @@ THICK_PLATE = case(THICK, RISE, gained, sweeps.SWEEPS["depth"].build, 0.3, 0.4, 
 CORNER = Case(STRUCK, GAINED, corner)
 THIN = Case("Thin soft plates at 20 m/s", APPROACH, thin)
 OVERLAPPING = Case("Stage 4, overlap of 10 %, 1:10", PLACE, overlapping)
+PARTED = Case("Tilted blocks that start inside each other", SPIN, parted)
 DEEP = Case("Blocks that start 60 % inside", INSERTED, deep)
 CRUSHED = Case("Cube struck by one of 10^4 times its mass", GAINED, crushed)
 SHEET = Case("A7 block on a membrane", SWEEPS, sheet)

@@ -28,6 +28,7 @@ class Surface:
         fraction: the part of s that a vertex moves, shape (n_vert,)
         upper_mean, lower_mean: of traction, stiffness, fraction at both sides of each contact,
             shape (contacts,)
+        centre, spin: centre of mass [m] and rotation [1/s] that each body gets, shape (n_body,)
     """
 
     found: wp.array[int]
@@ -47,9 +48,11 @@ class Surface:
     fraction: wp.array[float]
     upper_mean: wp.array[wp.vec3]
     lower_mean: wp.array[wp.vec3]
+    centre: wp.array[wp.vec3]
+    spin: wp.array[wp.vec3]
 
 
-def allocate(n_vert: int, n_tet: int, n_contact: int) -> Surface:
+def allocate(n_body: int, n_vert: int, n_tet: int, n_contact: int) -> Surface:
     """Allocate without any overlap."""
     found = wp.zeros(3, dtype=int)
     return Surface(
@@ -70,4 +73,6 @@ def allocate(n_vert: int, n_tet: int, n_contact: int) -> Surface:
         fraction=wp.zeros(n_vert, dtype=float),
         upper_mean=wp.zeros(n_contact, dtype=wp.vec3),
         lower_mean=wp.zeros(n_contact, dtype=wp.vec3),
+        centre=wp.zeros(n_body, dtype=wp.vec3),
+        spin=wp.zeros(n_body, dtype=wp.vec3),
     )

@@ -20,6 +20,7 @@ PARTS = (
     "second look",  # a detection pass after the closure
     "strays",  # vertices that left their triangle are closed as well
     "closure torque",  # handed back to the velocities
+    "search spin",  # bodies keep the angular momentum that the search would change
 )
 _off: set[str] = set()
 

@@ -114,7 +114,7 @@ def allocate_work(
         narrow_phase=narrow,
         contacts=contacts.allocate(n, m, narrow.n_inside),
         sweeps=sweeps.allocate(n, m),
-        surface=surface.allocate(n, model.n_tet, m),
+        surface=surface.allocate(model.n_body, n, model.n_tet, m),
         forces=contact_forces.allocate(n, capacity.pairs, unit),
         warm=warm_start.allocate(n, m),
     )

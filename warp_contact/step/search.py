@@ -6,9 +6,10 @@ import warp as wp
 
 from warp_contact.data.launch import launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.lengths import SEARCH_BOUND
-from warp_contact.kernels.surface import region, search
+from warp_contact.kernels.surface import region, search, spin
 from warp_contact.step.forces import internal_forces
 
 
@@ -50,6 +51,23 @@ def balance(model: Model, x: wp.array, work: Work, iterations: int) -> None:
         _tractions(model, x, work, s.at_trial)
         _correct(model, work, s.at_trial, anew=False)
     _displace(model, x, work, SEARCH_BOUND)
+
+
+def keep_spin(model: Model, state: State, work: Work) -> None:
+    """Give each body the angular momentum back that its displacements have changed."""
+    s = work.surface
+    wp.launch(
+        spin.lost_spin,
+        dim=model.n_body,
+        inputs=[model.body_vert, model.mass, work.mobility.inv_mass, work.x, state.x, state.v],
+        outputs=[s.centre, s.spin],
+    )
+    wp.launch(
+        spin.add_spin,
+        dim=model.n_vert,
+        inputs=[model.vert_body, s.centre, s.spin, state.x],
+        outputs=[state.v],
+    )
 
 
 def bisect(model: Model, x: wp.array, work: Work, iterations: int) -> None:

@@ -63,13 +63,19 @@ def _close_gaps(model: Model, state: State, work: Work) -> None:
 def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
     searched = on("search")
     if searched:
-        if_any(work.surface.any_old, search.balance, model, state.x, work, iterations)
+        if_any(work.surface.any_old, _search, model, state, work, iterations)
     rest = close if searched else close_all
     rest(model, state, work)
     if on("second look"):
         detect(model, state.x, state.x, work)
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, rest, model, state, work)
+
+
+def _search(model: Model, state: State, work: Work, iterations: int) -> None:
+    search.balance(model, state.x, work, iterations)
+    if on("search spin"):
+        search.keep_spin(model, state, work)
 
 
 def _close(model: Model, state: State, work: Work, deep: float) -> None:

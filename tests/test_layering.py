@@ -16,16 +16,19 @@ MAY = {  # room: those that it may import, beside itself
     "errors": set(),
     "progress": set(),
     "exclusive": set(),
+    "checks": set(),
     "data": {"kernels"},
-    "scene": {"kernels", "data"},
-    "step": {"kernels", "data"},
+    "scene": {"kernels", "data", "checks"},
+    "step": {"kernels", "data", "checks"},
     "frame": {"kernels", "data", "step", "errors"},
     "measure": {"kernels", "data", "scene", "step"},
-    "usd": set(),
-    "picture": {"kernels", "usd"},
-    "simulation": {"data", "scene", "step", "frame", "measure", "errors", "progress", "exclusive"},
+    "usd": {"checks"},
+    "picture": {"kernels", "usd", "checks"},
+    "simulation": {"data", "scene", "step", "frame", "measure"}
+    | {"errors", "progress", "exclusive", "checks"},
     "__init__": {"scene", "step", "measure", "usd", "simulation", "errors"},
-    "command": {"__init__", "errors", "progress", "scene", "step", "simulation", "usd", "picture"},
+    "command": {"__init__", "errors", "progress", "scene", "step", "simulation", "usd", "picture"}
+    | {"checks"},
     "__main__": {"command"},
 }
 LADDER = (  # of the kernel rooms: each may import those before it
@@ -41,9 +44,9 @@ LADDER = (  # of the kernel rooms: each may import those before it
 )
 RUNG = {room: rung for rung, rooms in enumerate(LADDER) for room in rooms}
 ONLY_IN = {  # packages that the solver does without
-    "pxr": {"scene/mesh", "usd", "picture/render"},
+    "pxr": {"scene/files", "scene/reading", "usd", "picture/render"},
     "PIL": {"picture/files"},
-    "meshio": {"scene/mesh"},
+    "meshio": {"scene/files", "scene/reading"},
     "matplotlib": set(),
 }
 # Folders whose files and functions are short.

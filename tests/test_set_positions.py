@@ -29,12 +29,12 @@ def test_an_episode_begins_anew(rng):
     x, v = sim.positions(), sim.velocities()
     run(sim, 5)
     before = sim.positions(2)
-    x[sim._range(1)] += rng.uniform(1.0, 2.0, 3).astype(np.float32)
-    start = x[sim._range(1)]
+    x[sim._bodies.range(1)] += rng.uniform(1.0, 2.0, 3).astype(np.float32)
+    start = x[sim._bodies.range(1)]
     sim.set_positions(1, start)
     np.testing.assert_array_equal(sim.positions(1), start)
     np.testing.assert_array_equal(sim.positions(2), before)  # nothing but the body moved
-    sim.set_velocity(1, v[sim._range(1)])
+    sim.set_velocity(1, v[sim._bodies.range(1)])
     run(sim, 12)
     # A free fall, exact but for the rounding of positions of 1 m.
     t = 12 / sim.fps
@@ -100,7 +100,7 @@ def test_who_was_inside_a_body_that_jumped_did_not_go_through_it(rng):
 
     def move(by: float) -> int:
         x = sim.positions()
-        x[sim._range(0)] += np.float32([0.0, 0.0, by])
+        x[sim._bodies.range(0)] += np.float32([0.0, 0.0, by])
         sim.state.x.assign(x)
         return sim.measure().tunnelled
 
@@ -133,14 +133,17 @@ def test_what_slept_on_a_body_that_jumped_falls():
 @pytest.mark.parametrize(
     ("body", "positions", "vertices", "message"),
     [
-        (1, np.full((27, 3), np.nan), None, "positions of body 'block' are not finite"),
-        (1, np.zeros((26, 3)), None, r"body 'block' are \(26, 3\), not \(27, 3\)"),
-        (1, np.zeros(3), [0], r"body 'block' are \(3,\), not \(1, 3\)"),
-        (None, np.zeros((27, 3)), None, r"positions are \(27, 3\), not \(72, 3\)"),
+        (1, np.full((27, 3), np.nan), None, "positions of body 'block' .*: give finite numbers"),
+        (1, np.zeros((26, 3)), None, r"body 'block' of shape \(26, 3\) .* of shape \(27, 3\)"),
+        (1, np.zeros(3), [0], r"body 'block' .* of shape \(1, 3\)"),
+        (None, np.zeros((27, 3)), None, r"positions of shape \(27, 3\) .* of shape \(72, 3\)"),
         (3, np.zeros((27, 3)), None, "no body 3: the scene has 3"),
         (-1, np.zeros((27, 3)), None, "no body -1: the scene has 3"),
-        (1, np.zeros((1, 3)), [27], "vertices of body 'block' names vertex 27 of 27"),
-        (None, np.zeros((1, 3)), [-1], "vertices of the scene names vertex -1 of 72"),
+        (1, np.zeros((1, 3)), [27], r"vertices of body 'block' \[27\]: give .* it names vertex 27"),
+        (1, np.zeros((2, 3)), [0, 0], "vertices of body 'block' .* it names one twice"),
+        (1, np.full((27, 3), 1e6), None, "body 'block' is 1e.06 m from the origin"),
+        (None, np.full((72, 3), 1e6), None, "body 'plate' is 1e.06 m from the origin"),
+        (None, np.zeros((1, 3)), [-1], r"vertices of the scene \[-1\]: give .* it names vertex -1"),
     ],
 )
 def test_positions_that_are_none_are_refused(body, positions, vertices, message):

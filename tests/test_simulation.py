@@ -170,11 +170,9 @@ def test_set_velocity_of_one_body_leaves_the_others(rng):
     np.testing.assert_array_equal(sim.velocities(1)[[0, 5, 7]], v)
     others = np.setdiff1d(np.arange(sim.model.n_vert), [27, 32, 34])
     np.testing.assert_array_equal(sim.velocities()[others], before[others])
-    with pytest.raises(ValueError, match="velocity of body 'body1' is not finite"):
+    with pytest.raises(ValueError, match=r"velocity of body 'body1' .*: give finite numbers"):
         sim.set_velocity(1, (0.0, np.inf, 0.0))
-    with pytest.raises(
-        ValueError, match=r"velocity of body 'body1' is \(2, 3\), not \(3,\) or \(1"
-    ):
+    with pytest.raises(ValueError, match=r"velocity of body 'body1' .*: give .* shape \(1, 3\)"):
         sim.set_velocity(1, v[:2], [4])
     with pytest.raises(ValueError, match="there is no body -1"):
         sim.set_velocity(-1, v)
@@ -204,11 +202,11 @@ def test_contact_fields_tell_who_touches_whom():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"fps": 0}, "fps 0 is not positive"),
-        ({"fps": float("nan")}, "fps nan is not positive"),
-        ({"fps": float("inf")}, "fps inf is not positive"),
-        ({"substeps": 0}, "substeps 0 is not a positive count"),
-        ({"substeps": 1.5}, "substeps 1.5 is not a positive count"),
+        ({"fps": 0}, "fps 0: give a number"),
+        ({"fps": float("nan")}, "fps nan: give a number"),
+        ({"fps": float("inf")}, "fps inf: give a number"),
+        ({"substeps": 0}, "substeps 0: give a whole number"),
+        ({"substeps": 1.5}, "substeps 1.5: give a whole number"),
         ({"device": "abacus"}, "unknown device 'abacus'; this machine has cpu"),
     ],
 )

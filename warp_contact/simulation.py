@@ -1,12 +1,12 @@
 """A scene in motion: frames, automatic substeps, what a user reads and sets between frames."""
 
-import math
 import os
 from collections.abc import Iterable, Iterator
 
 import numpy as np
 import warp as wp
 
+from warp_contact import checks
 from warp_contact.exclusive import exclusively
 from warp_contact.frame import checkpoint
 from warp_contact.frame.load_kernels import load_kernels
@@ -15,8 +15,14 @@ from warp_contact.measure.contact_fields import contact_fields
 from warp_contact.measure.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.scene.assemble import assemble
-from warp_contact.scene.scene import Body, Scene, vertex_ids
+from warp_contact.scene.scene import Body, Scene
+from warp_contact.scene.selection import Bodies
+from warp_contact.scene.topology import HUGE
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+
+RATES = 1e-6, 1e9  # of frames [1/s]
+RESPONSES = ContactSurface | Penalty | PredictedForce
+KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce()"
 
 
 class Simulation:
@@ -36,7 +42,7 @@ class Simulation:
     def __init__(
         self,
         scene: Scene,
-        response: ContactSurface | Penalty | PredictedForce | None = None,
+        response: RESPONSES | None = None,
         fps: float = 60,
         substeps: int | None = None,
         device: str | None = None,
@@ -60,22 +66,20 @@ class Simulation:
             ValueError: for an empty scene, an unknown device or response, fps or substeps that are
                 not positive
         """
-        if not (math.isfinite(fps) and fps > 0.0):
-            raise ValueError(f"fps {fps} is not positive")
-        if substeps is not None and (int(substeps) != substeps or substeps < 1):
-            raise ValueError(f"substeps {substeps} is not a positive count")
-        if int(max_substeps) != max_substeps or max_substeps < 1:
-            raise ValueError(f"max_substeps {max_substeps} is not a positive count")
-        self.scene = scene
-        self.response = _checked(ContactSurface() if response is None else response)
-        self.fps = fps
-        self.frame = 0
+        response = ContactSurface() if response is None else response
+        self.scene = checks.instance(scene, Scene, "scene", "a wc.Scene")
+        self.response = checks.instance(response, RESPONSES, "response", KNOWN)
+        self.fps, self.frame = checks.number(fps, "fps", *RATES), 0
+        substeps = None if substeps is None else checks.count(substeps, "substeps")
+        max_substeps = checks.count(max_substeps, "max_substeps")
+        sleeping = checks.flag(sleeping, "sleeping")
         self.device = _device(device)
         with exclusively(self.device):
             self.model, self.state = assemble(scene)
             scene.freeze()
+            self._bodies = Bodies(self.model, scene)
             load_kernels(self.model, self.device)
-            settings = self.response, fps, substeps, max_substeps, sleeping
+            settings = self.response, self.fps, substeps, max_substeps, sleeping
             self._stepper = Stepper(self.model, self.state, *settings)
             self._meter = Meter(self.model)
 
@@ -96,6 +100,10 @@ class Simulation:
             SimulationError: a position, velocity or stiffness is no longer finite, or no step is
                 stable; the state stays that of the last finished frame
         """
+        n, progress = checks.count(n, "n", least=0), checks.flag(progress, "progress")
+        return self._frames(n, progress)
+
+    def _frames(self, n: int, progress: bool) -> Iterator[int]:
         with Progress(n, quiet=not progress) as line:
             for _ in range(n):
                 self.step_frame()
@@ -119,11 +127,11 @@ class Simulation:
 
     def positions(self, body: Body | int | str | None = None) -> np.ndarray:
         """Copy of the positions [m] of one body or of all, shape (n, 3)."""
-        return self.state.x.numpy()[self._range(body)].copy()
+        return self.state.x.numpy()[self._bodies.range(body)].copy()
 
     def velocities(self, body: Body | int | str | None = None) -> np.ndarray:
         """Velocities [m/s] of one body or of all, at the time of the positions, shape (n, 3)."""
-        chosen = self._range(body)
+        chosen = self._bodies.range(body)
         with exclusively(self.device):
             return self._stepper.velocities()[chosen]
 
@@ -142,17 +150,14 @@ class Simulation:
             ValueError: there is no such body or vertex, or they are not finite or of that shape
         """
         x = self.state.x.numpy().copy()
-        part, chosen = self._choose(x, body, vertices)
-        of = "positions" if body is None else f"positions of body '{self._label(body)}'"
-        if np.shape(positions) != part[chosen].shape:
-            raise ValueError(f"{of} are {np.shape(positions)}, not {part[chosen].shape}")
-        part[chosen] = positions
-        if not np.isfinite(part).all():
-            raise ValueError(f"{of} are not finite")
+        part, chosen = self._bodies.choose(x, body, vertices)
+        of = "positions" if body is None else f"positions of body '{self._bodies.label(body)}'"
+        part[chosen] = checks.numbers(positions, part[chosen].shape, of, HUGE)
+        self._bodies.refuse_far(x, body)
         with exclusively(self.device):
             self._meter.tunnelling.follow(self.state.x)
             self._stepper.set_positions(x)
-            own = self.model.vert_body.numpy()[self._range(body)]
+            own = self.model.vert_body.numpy()[self._bodies.range(body)]
             self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
 
     def set_velocity(self, body: Body | int | str, velocity, vertices=None) -> None:
@@ -167,16 +172,12 @@ class Simulation:
             ValueError: there is no such body or vertex, or it is not finite or of that shape
         """
         v = np.zeros((self.model.n_vert, 3), dtype=np.float32)
-        part, chosen = self._choose(v, body, vertices)
-        of = f"velocity of body '{self._label(body)}'"
-        if np.shape(velocity) not in ((3,), part[chosen].shape):
-            raise ValueError(f"{of} is {np.shape(velocity)}, not (3,) or {part[chosen].shape}")
-        part[chosen] = velocity
-        if not np.isfinite(part).all():
-            raise ValueError(f"{of} is not finite")
-        at = self._range(body).start + chosen
+        part, chosen = self._bodies.choose(v, body, vertices)
+        of = f"velocity of body '{self._bodies.label(body)}'"
+        part[chosen] = checks.vectors(velocity, len(chosen), of, checks.FASTEST)
+        at = self._bodies.range(body).start + chosen
         with exclusively(self.device):
-            self._stepper.set_velocities(v[at], at, self._index(body))
+            self._stepper.set_velocities(v[at], at, self._bodies.index(body))
 
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Begin anew: the next frames give the bits of the first ones.
@@ -198,7 +199,7 @@ class Simulation:
             if not (own == world).any():
                 raise ValueError(f"no body is in world {world!r}")
             for body in np.flatnonzero(own == world):
-                part = self._range(int(body))
+                part = self._bodies.range(int(body))
                 self.set_positions(int(body), x[part])
                 self.set_velocity(int(body), v[part])
 
@@ -225,6 +226,7 @@ class Simulation:
         The scene is not in it: build it anew, make a ``Simulation`` of it with the same settings,
         and ``load`` the file. Velocities given to fixed vertices are part of it.
         """
+        path = checks.path(path, "path")
         with exclusively(self.device):
             values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
             values |= {"frame": np.array(self.frame)} | self._stepper.values()
@@ -238,7 +240,7 @@ class Simulation:
             OSError: it cannot be read
             ValueError: it is no checkpoint, or one of another scene or other settings
         """
-        values = checkpoint.read(path, self._fingerprint())
+        values = checkpoint.read(checks.path(path, "path"), self._fingerprint())
         with exclusively(self.device):
             self.state.x.assign(values["x"])
             self.state.v.assign(values["v"])
@@ -252,48 +254,12 @@ class Simulation:
         settings = self.response, self.fps, self._stepper.wanted, sleeping
         return checkpoint.fingerprint(self.model, *settings)
 
-    def _range(self, body: Body | int | str | None) -> slice:
-        if body is None:
-            return slice(None)
-        index = self._index(body)
-        first, last = self.model.body_vert.numpy()[index : index + 2].tolist()
-        return slice(first, last)
-
-    def _index(self, body: Body | int | str) -> int:
-        if isinstance(body, str):
-            if body not in self.model.labels:
-                known = ", ".join(self.model.labels)
-                raise ValueError(f"there is no body '{body}': the scene has {known}")
-            body = self.model.labels.index(body)
-        index = body.index if isinstance(body, Body) else int(body)
-        if not 0 <= index < self.model.n_body:
-            raise ValueError(f"there is no body {index}: the scene has {self.model.n_body}")
-        if isinstance(body, Body) and body is not self.scene.bodies[index]:
-            raise ValueError(f"body '{body.label}' is of another scene")
-        return index
-
-    def _label(self, body: Body | int | str) -> str:
-        return self.model.labels[self._index(body)]
-
-    def _choose(self, values: np.ndarray, body, vertices) -> tuple[np.ndarray, np.ndarray]:
-        """A body's part of the values, as a view, and the vertices that are chosen of it."""
-        part = values[self._range(body)]
-        of = "the scene" if body is None else f"body '{self._label(body)}'"
-        name = f"vertices of {of}"
-        chosen = np.arange(len(part)) if vertices is None else vertex_ids(vertices, len(part), name)
-        return part, chosen
-
-
-def _checked(response) -> ContactSurface | Penalty | PredictedForce:
-    if isinstance(response, ContactSurface | Penalty | PredictedForce):
-        return response
-    known = "wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce()"
-    raise ValueError(f"response {response!r} is none of {known}")
-
 
 def _device(name: str | None) -> wp.Device:
+    known = ", ".join(device.alias for device in wp.get_devices())
+    if not isinstance(name, str | wp.Device | None):
+        raise checks.refuse("device", name, f"a name: this machine has {known}")
     try:
         return wp.get_device(name)
     except ValueError:
-        known = ", ".join(device.alias for device in wp.get_devices())
         raise ValueError(f"unknown device '{name}'; this machine has {known}") from None

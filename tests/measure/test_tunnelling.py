@@ -36,7 +36,7 @@ def points(sim: Simulation, body: int) -> int:
 def move(sim: Simulation, way, body: int | None = 1) -> None:
     """Displace a body, or all, and look."""
     x = sim.positions()
-    x[sim._range(body)] += np.float32(way)
+    x[sim._bodies.range(body)] += np.float32(way)
     place(sim, x)
 
 
@@ -76,7 +76,7 @@ def test_the_number_of_looks_does_not_matter(turned, rng):
 def test_a_point_counts_in_any_frame_that_moves_and_stretches(turned, rng):
     sim = over_a_plate(turned())
     x = sim.positions().astype(float)
-    x[sim._range(1)] += [0.0, 0.0, -0.9]
+    x[sim._bodies.range(1)] += [0.0, 0.0, -0.9]
     a, b = affine(rng)
     place(sim, x @ a.T + b)
     assert sim.measure().tunnelled >= points(sim, 1)

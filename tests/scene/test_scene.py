@@ -12,11 +12,14 @@ RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"friction": -0.1}, "friction -0.1 is negative"),
-        ({"friction": float("nan")}, "friction nan is not finite"),
-        ({"gravity": (0.0, 1.0)}, "gravity .* is not finite or not of shape"),
-        ({"gravity": (0.0, 0.0, np.nan)}, "gravity .* is not finite or not of shape"),
-        ({"gravity": "down"}, "gravity 'down' is not a number"),
+        ({"friction": -0.1}, "friction -0.1: give a number of 0 or more"),
+        ({"friction": float("nan")}, "friction nan: give a number of 0 or more"),
+        ({"gravity": (0.0, 1.0)}, r"gravity \(0.0, 1.0\): give finite numbers of shape \(3,\)"),
+        (
+            {"gravity": (0.0, 0.0, np.nan)},
+            r"gravity .*: give finite numbers .* at \(2,\) it is nan",
+        ),
+        ({"gravity": "down"}, "gravity 'down': give finite numbers"),
     ],
 )
 def test_a_scene_refuses_what_is_no_physics(options, message):
@@ -27,24 +30,32 @@ def test_a_scene_refuses_what_is_no_physics(options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"fixed": [0, 8]}, "body 'cube': fixed names vertex 8 of 8"),
-        ({"fixed": [-1]}, "body 'cube': fixed names vertex -1 of 8"),
-        ({"fixed": np.zeros(7, dtype=bool)}, r"fixed has shape \(7,\), there are 8"),
-        ({"fixed": [0.5]}, "fixed: neither a mask nor vertex ids"),
+        ({"fixed": [0, 8]}, r"body 'cube': fixed \[0, 8\]: give .* it names vertex 8"),
+        ({"fixed": [-1]}, "body 'cube': fixed .* it names vertex -1"),
+        (
+            {"fixed": np.zeros(7, dtype=bool)},
+            r"fixed .* shape \(7,\) .*: give a mask of shape \(8,\)",
+        ),
+        ({"fixed": [0.5]}, r"fixed \[0.5\]: give a mask"),
         ({"label": "floor"}, "body 'floor': another body has this label"),
         ({"label": "plane0"}, "body 'plane0': this is how a half-space is called"),
-        ({"rotation": (0, 0, 0, 0)}, "body 'cube': rotation is a zero quaternion"),
-        ({"position": (0, 0, np.nan)}, "body 'cube': position .* is not finite"),
-        ({"velocity": (0, 0, np.nan)}, "body 'cube': velocity .* is not finite"),
-        ({"velocity": np.zeros((7, 3))}, r"body 'cube': velocity [\s\S]* not of shape"),
-        ({"world": -1}, "body 'cube': world -1 is not a count"),
-        ({"world": None}, "body 'cube': world None is not a count"),
-        ({"mesh": "bunny"}, "body 'cube': mesh is a str, not a TetMesh"),
-        ({"material": NeoHookean(-1.0, 0.3, 1.0)}, "body 'cube': youngs_modulus must be positive"),
         (
-            {"material": NeoHookean("soft", 0.3, 1.0)},
-            "'cube': youngs_modulus 'soft' is not a number",
+            {"rotation": (0, 0, 0, 0)},
+            "body 'cube': rotation .*: give numbers that are not all zero",
         ),
+        ({"position": (0, 0, np.nan)}, "body 'cube': position .*: give finite numbers"),
+        ({"velocity": (0, 0, np.nan)}, "body 'cube': velocity .*: give finite numbers"),
+        (
+            {"velocity": np.zeros((7, 3))},
+            r"body 'cube': velocity of shape \(7, 3\) .*: give .* of shape \(8, 3\)",
+        ),
+        ({"world": -1}, "body 'cube': world -1: give a whole number"),
+        ({"world": None}, "body 'cube': world None: give a whole number"),
+        ({"mesh": "bunny"}, "body 'cube': mesh 'bunny': give a TetMesh"),
+        ({"material": None}, "body 'cube': material None: give a material"),
+        ({"material": NeoHookean}, "body 'cube': material .*: give a material, such as wc.Neo"),
+        ({"fixed": 0}, r"body 'cube': fixed 0: give a mask of shape \(8,\) or a list"),
+        ({"label": "a\nb"}, r"label 'a.nb': give a text"),
     ],
 )
 def test_a_body_is_refused_by_its_name(options, message):
@@ -78,7 +89,7 @@ def test_a_plane_is_normalised_but_its_offset_is_a_length():
     normal, offset = scene.planes[0]
     np.testing.assert_array_equal(normal, [0.0, 0.0, 1.0])
     assert offset == 0.5
-    with pytest.raises(ValueError, match="plane normal is zero"):
+    with pytest.raises(ValueError, match=r"plane normal .*: give numbers that are not all zero"):
         scene.add_plane((0.0, 0.0, 0.0))
 
 
@@ -92,7 +103,7 @@ def test_a_plane_is_normalised_but_its_offset_is_a_length():
     ],
 )
 def test_a_response_without_sense_is_refused(response, options):
-    with pytest.raises(ValueError, match=r"neither|not a |not positive|negative"):
+    with pytest.raises(ValueError, match=r": give "):
         response(**options)
 
 
@@ -118,7 +129,7 @@ def test_a_scene_that_a_simulation_has_taken_over_refuses_to_change():
 def test_what_is_no_response_is_refused_before_the_first_step(response):
     scene = Scene()
     scene.add_body(box(0.1, 1), NeoHookean(1e5, 0.3, 1000.0))
-    with pytest.raises(ValueError, match=r"response .* is none of wc.ContactSurface"):
+    with pytest.raises(ValueError, match=r"response .*: give one of wc.ContactSurface"):
         Simulation(scene, response)
 
 

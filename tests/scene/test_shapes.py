@@ -149,5 +149,5 @@ def test_a_dish_is_a_cap_of_a_spherical_shell():
     ],
 )
 def test_a_shape_without_size_is_refused(make):
-    with pytest.raises(ValueError, match="needs"):
+    with pytest.raises(ValueError, match=": give "):
         make()

@@ -22,12 +22,14 @@ def on_floor(mesh, response: Penalty, plane: bool, substeps: int | None = None) 
 
 def masses(sim: Simulation) -> np.ndarray:
     """Of the body 'it' [kg], shape (n, 1)."""
-    return sim.model.mass.numpy()[sim._range("it"), None].astype(np.float64)
+    return sim.model.mass.numpy()[sim._bodies.range("it"), None].astype(np.float64)
 
 
 def momentum(sim: Simulation) -> np.ndarray:
     """Of the velocities of the steps, half of one before the positions [kg m/s]."""
-    return (masses(sim) * sim.state.v.numpy()[sim._range("it")]).sum(axis=0, dtype=np.float64)
+    return (masses(sim) * sim.state.v.numpy()[sim._bodies.range("it")]).sum(
+        axis=0, dtype=np.float64
+    )
 
 
 @pytest.mark.parametrize("plane", [True, False], ids=["plane", "body"])

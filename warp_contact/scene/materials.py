@@ -10,31 +10,25 @@ A model is one kernel file (``kernels/elastic/<model>.py``) and one class here w
 * ``check()``: raises ValueError with a reason.
 """
 
-import math
-from dataclasses import dataclass, fields
-from numbers import Real
+from dataclasses import dataclass
 from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
 
+from warp_contact import checks
 from warp_contact.kernels.elastic import corotated, neo_hookean, springs
 from warp_contact.scene.topology import EDGES
 
 OPPOSITE = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))  # opposite to corners 0, 1, 2, 3
+DENSITY = 1e-6, 1e9  # [kg/m^3]; masses and their inverses fit float32 in bodies of any size
+STIFFNESS = 1e-6, 1e15  # of Young's modulus [Pa]
+LONGEST = 1e6  # of damping [s]
 
 
 def _check_common(material) -> None:
-    for field in fields(material):
-        value = getattr(material, field.name)
-        if not isinstance(value, Real):
-            raise ValueError(f"{field.name} {value!r} is not a number")
-        if not math.isfinite(value):
-            raise ValueError(f"{field.name} must be finite, not {value}")
-    if material.density <= 0.0:
-        raise ValueError(f"density must be positive, not {material.density} kg/m^3")
-    if material.damping < 0.0:
-        raise ValueError(f"damping must not be negative, not {material.damping} s")
+    checks.number(material.density, "density", *DENSITY)
+    checks.number(material.damping, "damping", 0.0, LONGEST)
 
 
 @dataclass(frozen=True)
@@ -54,13 +48,17 @@ class _Solid:
     density: float
     damping: float = 0.0
 
+    def __post_init__(self):
+        """As ``check``."""
+        self.check()
+
     def check(self) -> None:
         """Raise ValueError if the numbers make no material."""
         _check_common(self)
-        if self.youngs_modulus <= 0.0:
-            raise ValueError(f"youngs_modulus must be positive, not {self.youngs_modulus} Pa")
-        if not -1.0 < self.poisson_ratio < 0.5:
-            raise ValueError(f"poisson_ratio must be within (-1, 0.5), not {self.poisson_ratio}")
+        checks.number(self.youngs_modulus, "youngs_modulus", *STIFFNESS)
+        ratio = checks.number(self.poisson_ratio, "poisson_ratio", -1.0, 0.5)
+        if not -1.0 < ratio < 0.5:
+            raise checks.refuse("poisson_ratio", ratio, "a number between -1 and 0.5")
 
     def lame(self) -> tuple[float, float]:
         """Return mu and lambda [Pa] of small strain."""
@@ -106,12 +104,15 @@ class SpringNetwork:
     damping: float = 0.0
     kernels: ClassVar[ModuleType] = springs
 
+    def __post_init__(self):
+        """As ``check``."""
+        self.check()
+
     def check(self) -> None:
         """Raise ValueError if the numbers make no material."""
         _check_common(self)
         for name in ("distance", "area", "volume"):
-            if getattr(self, name) < 0.0:
-                raise ValueError(f"{name} must not be negative, not {getattr(self, name)} J")
+            checks.number(getattr(self, name), name, least=0.0)
 
     def parameters(self, vertices: np.ndarray, tets: np.ndarray) -> np.ndarray:
         """Return the row described in ``elastic/springs.py`` for each tet, shape (n, 22)."""

@@ -1,18 +1,14 @@
 """A tetrahedral mesh: arrays in, checked and oriented; surface, edges, files out."""
 
-from contextlib import redirect_stderr, redirect_stdout
 from functools import cached_property
-from io import StringIO
-from pathlib import Path
 
 import numpy as np
 
-from warp_contact.scene import topology
+from warp_contact import checks
+from warp_contact.scene import files, pieces, topology
 from warp_contact.scene.topology import EDGES, MeshError
 
 __all__ = ["MeshError", "TetMesh"]
-
-USD = (".usd", ".usda", ".usdc")
 
 
 class TetMesh:
@@ -40,7 +36,8 @@ class TetMesh:
     def __repr__(self) -> str:
         """Counts only."""
         counts = f"{len(self.vertices)} vertices, {len(self.tets)} tets"
-        return f"<TetMesh {counts}, {len(self.surface)} surface triangles>"
+        apart = f" in {self.n_pieces} pieces" if self.n_pieces > 1 else ""
+        return f"<TetMesh {counts}{apart}, {len(self.surface)} surface triangles>"
 
     @cached_property
     def volumes(self) -> np.ndarray:
@@ -68,13 +65,51 @@ class TetMesh:
         l2 = np.einsum("mek,mek->m", edge, edge) / 6.0
         return _frozen(6.0 * np.sqrt(2.0) * self.volumes / l2**1.5)
 
+    @cached_property
+    def n_pieces(self) -> int:
+        """Number of pieces: parts that share no vertex."""
+        label = pieces.components(self.edges, len(self.vertices))
+        return int((label == np.arange(len(label))).sum())
+
+    @cached_property
+    def seams(self) -> np.ndarray:
+        """Pairs of surface vertices in the same place, which nothing joins, shape (k, 2), int64.
+
+        ``welded`` makes one of each.
+        """
+        ids = np.unique(self.surface)
+        return _frozen(ids[pieces.coincident(self.vertices[ids], self._seam)])
+
+    @property
+    def _seam(self) -> float:
+        """Distance [m] below which two vertices are in the same place."""
+        p, q = self.vertices[self.edges.T]
+        return pieces.SEAM * float(np.linalg.norm(p - q, axis=1).mean())
+
+    def welded(self, tolerance: float | None = None) -> "TetMesh":
+        """The same mesh with one vertex for all that are in the same place.
+
+        Args:
+            tolerance: distance [m] up to which they are; a millionth of the mean edge if None
+
+        Raises:
+            MeshError: a tet would lose its volume, or the result is no mesh
+        """
+        near = self._seam if tolerance is None else checks.positive(tolerance, "tolerance")
+        pairs = pieces.coincident(self.vertices, near)
+        return TetMesh(*pieces.welded(self.vertices, self.tets, pairs))
+
     def transformed(self, matrix, translation=(0.0, 0.0, 0.0)) -> "TetMesh":
         """Map each vertex x to matrix x + translation [m]; a mirroring matrix is allowed."""
-        x = self.vertices @ np.asarray(matrix, dtype=float).T + np.asarray(translation, dtype=float)
-        return TetMesh(x, self.tets)
+        matrix = checks.numbers(matrix, (3, 3), "matrix")
+        move = checks.numbers(translation, (3,), "translation", most=topology.HUGE)
+        return TetMesh(self.vertices @ matrix.T + move, self.tets)
 
     def scaled(self, sx: float, sy: float, sz: float) -> "TetMesh":
         """Stretch about the origin; turns a sphere into an ellipsoid."""
+        for name, factor in zip(("sx", "sy", "sz"), (sx, sy, sz), strict=True):
+            if checks.number(factor, name) == 0.0:
+                raise checks.refuse(name, factor, "another number than zero")
         return self.transformed(np.diag([sx, sy, sz]))
 
     def reordered(self) -> tuple["TetMesh", np.ndarray]:
@@ -94,113 +129,34 @@ class TetMesh:
 
     def save(self, path) -> None:
         """Write ``.npz``, USD (``.usd``, ``.usda``, ``.usdc``) or, by suffix, what meshio knows."""
-        path = Path(path)
-        if not path.parent.is_dir():
-            raise FileNotFoundError(f"no such folder: {path.parent}")
-        if path.suffix == ".npz":
-            np.savez_compressed(path, vertices=self.vertices, tets=self.tets)
-        elif path.suffix in USD:
-            _save_usd(path, self)
-        else:
-            meshio = _meshio(path)
-            mesh = meshio.Mesh(self.vertices, [("tetra", self.tets)])
-            _or_mesh_error(path, "written", lambda: meshio.write(path, mesh))
+        files.save(path, self.vertices, self.tets, self.surface)
 
     @staticmethod
-    def load(path, prim: str | None = None) -> "TetMesh":
-        """Read what ``save`` writes; the unit is the metre.
+    def load(path, prim: str | None = None, unit: float | None = None) -> "TetMesh":
+        """Read what ``save`` writes, and with meshio many other formats.
 
         From USD comes the first TetMesh or the one at the path ``prim``, as placed in the stage at
         its earliest time, in metres where the stage says what its unit is, and with z up where it
         says that y is. Other formats often list auxiliary vertices: those that no tet uses are
-        dropped.
+        dropped. Hexes, prisms and pyramids are cut into tets; of cells of higher order the corners
+        are taken. A file that holds only a surface is refused: it has to be filled before.
+
+        Args:
+            path: the file
+            prim: path of a TetMesh in a USD file
+            unit: metres per unit of the file, such as 1e-3; for files that do not say it
+
+        Raises:
+            OSError: there is no such file, or it is none
+            ValueError: it is damaged, holds no mesh or says its unit itself; MeshError for most
         """
-        path = Path(path)
-        if not path.exists():
-            raise FileNotFoundError(f"no such mesh file: {path}")
-        if path.suffix == ".npz":
-            vertices, tets = _or_mesh_error(path, "read", lambda: _load_npz(path))
-        elif path.suffix in USD:
-            vertices, tets = _load_usd(path, prim)
-        else:
-            vertices, tets = _load_meshio(path)
-        return TetMesh(vertices, tets)
+        vertices, tets = files.load(path, prim, unit)
+        try:
+            return TetMesh(vertices, tets)
+        except MeshError as error:
+            raise MeshError(f"{path}: {error}") from None
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:
     array.flags.writeable = False
     return array
-
-
-def _load_npz(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    with np.load(path, allow_pickle=False) as data:
-        return data["vertices"], data["tets"]
-
-
-def _or_mesh_error(path: Path, verb: str, action):
-    """Run a reader or writer without output; its errors become one MeshError."""
-    try:
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
-            return action()
-    except OSError:
-        raise
-    except (Exception, SystemExit) as error:  # meshio leaves by sys.exit
-        raise MeshError(f"{path}: cannot be {verb} as a '{path.suffix}' mesh") from error
-
-
-def _meshio(path: Path):
-    try:
-        import meshio
-    except ImportError as error:
-        hint = "needs meshio: pip install 'warp_contact[mesh]'"
-        raise MeshError(f"{path}: the format '{path.suffix}' {hint}") from error
-    return meshio
-
-
-def _load_meshio(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    meshio = _meshio(path)
-    mesh = _or_mesh_error(path, "read", lambda: meshio.read(path))
-    tets = [block.data for block in mesh.cells if block.type == "tetra"]
-    if not tets:
-        raise MeshError(f"{path}: holds no tets")
-    used, tets = np.unique(np.concatenate(tets), return_inverse=True)
-    return mesh.points[used], tets.reshape(-1, 4)
-
-
-def _save_usd(path: Path, mesh: TetMesh) -> None:
-    from pxr import Usd, UsdGeom, Vt
-
-    stage = Usd.Stage.CreateInMemory()
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
-    prim = UsdGeom.TetMesh.Define(stage, "/mesh")
-    stage.SetDefaultPrim(prim.GetPrim())
-    points = mesh.vertices.astype(np.float32)
-    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    prim.CreateTetVertexIndicesAttr(Vt.Vec4iArray.FromNumpy(mesh.tets))
-    prim.CreateSurfaceFaceVertexIndicesAttr(Vt.Vec3iArray.FromNumpy(mesh.surface))
-    prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
-    stage.Export(str(path))
-
-
-def _load_usd(path: Path, name: str | None) -> tuple[np.ndarray, np.ndarray]:
-    from pxr import Usd, UsdGeom
-
-    stage = _or_mesh_error(path, "read", lambda: Usd.Stage.Open(str(path)))
-    found = [p for p in stage.Traverse() if p.IsA(UsdGeom.TetMesh)]
-    if name is not None:
-        found = [p for p in found if str(p.GetPath()) == name]
-    if not found:
-        raise MeshError(f"{path}: holds no TetMesh" + (f" at {name}" if name else ""))
-    time = Usd.TimeCode.EarliestTime()
-    tetmesh = UsdGeom.TetMesh(found[0])
-    points = np.array(tetmesh.GetPointsAttr().Get(time), dtype=float)
-    tets = np.array(tetmesh.GetTetVertexIndicesAttr().Get(time))
-    if points.ndim != 2 or tets.ndim != 2:
-        raise MeshError(f"{path}: the TetMesh {found[0].GetPath()} has no points or no tets")
-    place = np.array(tetmesh.ComputeLocalToWorldTransform(time))  # acts on row vectors
-    stated = stage.HasAuthoredMetadata("metersPerUnit")
-    unit = UsdGeom.GetStageMetersPerUnit(stage) if stated else 1.0
-    x = unit * (points @ place[:3, :3] + place[3, :3])
-    y_up = stage.HasAuthoredMetadata("upAxis") and UsdGeom.GetStageUpAxis(stage) == "Y"
-    return x[:, [0, 2, 1]] * (1.0, -1.0, 1.0) if y_up else x, tets

@@ -1,4 +1,6 @@
-"""Checks of the placement of bodies: where no simulation can start."""
+"""Checks of the shape and the placement of bodies: where no simulation can start."""
+
+import warnings
 
 import numpy as np
 
@@ -7,6 +9,31 @@ from warp_contact.kernels.lengths import REST_GAP, SAME_PLACE
 ROUNDING = 2.0**-24  # of a float32, at most
 DROWNED = 10.0  # resting gaps by which rounding may move a body: soft ones tolerate it
 STRAINED = 0.02  # strain that rounding of the positions may put on a tet
+PLAUSIBLE = 1e-5, 1e3  # size of a body [m]
+
+
+def check_shape(mesh, label: str) -> None:
+    """Warn of a mesh [m] of an unlikely size, or one that falls apart along seams.
+
+    Raises:
+        ValueError: every tet has vertices of its own
+    """
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    if not PLAUSIBLE[0] <= size <= PLAUSIBLE[1]:
+        warnings.warn(
+            f"body '{label}' is {size:.4g} m large; for millimetres load its mesh with unit=1e-3, "
+            f"or take mesh.scaled(1e-3, 1e-3, 1e-3)",
+            stacklevel=3,
+        )
+    if not len(mesh.seams):
+        return
+    if mesh.n_pieces == len(mesh.tets) > 1:
+        raise ValueError("its tets share no vertex, so that they fall apart: take mesh.welded()")
+    warnings.warn(
+        f"body '{label}': {len(mesh.seams)} pairs of its surface vertices are in the same place "
+        f"but not joined: its {mesh.n_pieces} pieces part there; mesh.welded() joins them",
+        stacklevel=3,
+    )
 
 
 def check(bodies: list) -> None:
@@ -20,18 +47,30 @@ def check(bodies: list) -> None:
     """
     edges = [_mean_edge(body) for body in bodies]
     for body, edge in zip(bodies, edges, strict=True):
-        far, most = float(np.abs(body.x).max()), DROWNED * REST_GAP * edge / ROUNDING
-        if far > most:
-            raise ValueError(
-                f"body '{body.label}' is {far:.4g} m from the origin: beyond {most:.4g} m, "
-                f"rounding is {DROWNED:g} times its gap at rest; place the scene about the origin"
-            )
-        strain = far * ROUNDING / _heights(body)
+        check_distance(body.x, edge, body.label)
+        if not np.isfinite(body.v).all():
+            raise ValueError(f"body '{body.label}' has a velocity that is not finite")
+        strain = float(np.abs(body.x).max()) * ROUNDING / _heights(body)
         if strain.max() > STRAINED:
             raise ValueError(
                 f"body '{body.label}', tet {int(strain.argmax())} is too flat: rounding of its "
                 f"positions would strain it by {strain.max():.2g}; remesh it"
             )
+    check_apart(bodies, edges)
+
+
+def check_distance(x: np.ndarray, edge: float, label: str) -> None:
+    """Check the positions [m] of a body of a mean edge [m]; raises ValueError."""
+    far, most = float(np.abs(x).max()), DROWNED * REST_GAP * edge / ROUNDING
+    if not far <= most:  # nor for what is no number
+        raise ValueError(
+            f"body '{label}' is {far:.4g} m from the origin: beyond {most:.4g} m, "
+            f"rounding is {DROWNED:g} times its gap at rest; place the scene about the origin"
+        )
+
+
+def check_apart(bodies: list, edges: list) -> None:
+    """Check that no two bodies, of given mean edges [m], fill the same space; as ``check``."""
     shape = np.array([_shape(body) for body in bodies])
     slack = SAME_PLACE * np.array(edges)
     world = np.array([body.world for body in bodies])

@@ -2,11 +2,13 @@
 
 import re
 from dataclasses import dataclass, field
-from numbers import Integral
 
 import numpy as np
 
+from warp_contact import checks
+from warp_contact.scene import placement
 from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.topology import HUGE
 
 PLANE = re.compile(r"plane\d+")  # names of half-spaces in measurements
 
@@ -48,17 +50,19 @@ class Scene:
 
     def __init__(self, gravity=(0.0, 0.0, -9.81), friction: float = 0.3):
         """Raises ValueError for a gravity that is not three numbers or a negative friction."""
-        self.gravity = tuple(numbers(gravity, (3,), "gravity").tolist())
-        self.friction = float(numbers(friction, (), "friction"))
-        if self.friction < 0.0:
-            raise ValueError(f"friction {friction} is negative")
+        self.gravity = gravity
+        self.friction = friction
         self.bodies: list[Body] | tuple[Body, ...] = []
         self._labels: set[str] = set()
         self.planes: list[tuple[np.ndarray, float]] | tuple = []
 
     def __setattr__(self, name: str, value) -> None:
-        """Raises ValueError for a scene that a simulation has taken over."""
+        """Raises ValueError for a scene that a simulation has taken over, or a wrong value."""
         self._refuse_if_frozen(name)
+        if name == "gravity":
+            value = tuple(checks.numbers(value, (3,), name).tolist())
+        elif name == "friction":
+            value = checks.number(value, name, least=0.0)
         super().__setattr__(name, value)
 
     def freeze(self) -> None:
@@ -102,18 +106,18 @@ class Scene:
         label = self._new_label(label)
         try:
             if not isinstance(mesh, TetMesh):
-                raise ValueError(f"mesh is a {type(mesh).__name__}, not a TetMesh")
-            material.check()
+                raise checks.refuse("mesh", mesh, "a TetMesh, such as wc.box(0.1, 2)")
+            _check_material(material)
             n = len(mesh.vertices)
             turn = rotation_matrix(rotation)
-            x = mesh.vertices @ turn.T + numbers(position, (3,), "position")
-            v = np.broadcast_to(_velocity(velocity, n), (n, 3)).copy()
-            mask = _mask(fixed, n)
-            if not isinstance(world, Integral) or world < 0:
-                raise ValueError(f"world {world} is not a count")
+            x = mesh.vertices @ turn.T + checks.numbers(position, (3,), "position", HUGE)
+            v = checks.vectors(velocity, n, "velocity", checks.FASTEST)
+            mask, world = _mask(fixed, n), checks.count(world, "world", least=0)
+            placement.check_shape(mesh, label)
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None
-        body = Body(len(self.bodies), label, mesh, material, x, v, mask, int(world))
+        v = np.broadcast_to(v, (n, 3)).copy()
+        body = Body(len(self.bodies), label, mesh, material, x, v, mask, world)
         self.bodies.append(body)
         self._labels.add(label)
         return body
@@ -121,7 +125,7 @@ class Scene:
     def _new_label(self, label: str | None) -> str:
         """A label that no body has; raises ValueError for one that is taken or that of a plane."""
         self._refuse_if_frozen("a body")
-        label = f"body{len(self.bodies)}" if label is None else str(label)
+        label = f"body{len(self.bodies)}" if label is None else checks.label(label, "label")
         if label in self._labels:
             raise ValueError(f"body '{label}': another body has this label")
         if PLANE.fullmatch(label):
@@ -131,20 +135,13 @@ class Scene:
     def add_plane(self, normal, offset: float = 0.0) -> None:
         """Keep every body in the half-space normal . x >= offset [m]."""
         self._refuse_if_frozen("a plane")
-        n = numbers(normal, (3,), "plane normal")
-        length = float(np.linalg.norm(n))
-        if length == 0.0:
-            raise ValueError("plane normal is zero")
-        self.planes.append((n / length, float(numbers(offset, (), "plane offset"))))
+        n = _unit(checks.numbers(normal, (3,), "plane normal"), "plane normal")
+        self.planes.append((n, checks.number(offset, "plane offset", -HUGE, HUGE)))
 
 
 def rotation_matrix(quaternion) -> np.ndarray:
     """Rotation of a quaternion (x, y, z, w) of any length above zero, shape (3, 3)."""
-    q = numbers(quaternion, (4,), "rotation")
-    length = float(np.linalg.norm(q))
-    if length == 0.0:
-        raise ValueError("rotation is a zero quaternion")
-    x, y, z, w = q / length
+    x, y, z, w = _unit(checks.numbers(quaternion, (4,), "rotation"), "rotation")
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -154,42 +151,25 @@ def rotation_matrix(quaternion) -> np.ndarray:
     )
 
 
-def numbers(value, shape: tuple, name: str) -> np.ndarray:
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} {value!r} is not a number") from None
-    if array.shape != shape or not np.isfinite(array).all():
-        raise ValueError(f"{name} {value!r} is not finite or not of shape {shape}")
-    return array
+def _unit(vector: np.ndarray, name: str) -> np.ndarray:
+    length = float(np.linalg.norm(vector))
+    if length < checks.SMALLEST:
+        raise checks.refuse(name, vector.tolist(), "numbers that are not all zero")
+    return vector / length
 
 
-def _velocity(velocity, n: int) -> np.ndarray:
-    shape = (n, 3) if np.ndim(velocity) == 2 else (3,)
-    return numbers(velocity, shape, "velocity")
+def _check_material(material) -> None:
+    """Raises ValueError for what is no material, and for a class that was not called."""
+    if isinstance(material, type) or not callable(getattr(material, "check", None)):
+        wanted = "a material, such as wc.NeoHookean(1e5, 0.4, 1000.0)"
+        raise checks.refuse("material", material, wanted)
+    material.check()
 
 
 def _mask(fixed, n: int) -> np.ndarray:
     mask = np.zeros(n, dtype=bool)
-    if fixed is None or fixed is False:
-        return mask
-    if fixed is True:
-        return ~mask
-    mask[vertex_ids(fixed, n, "fixed")] = True
+    if isinstance(fixed, bool | np.bool_):
+        return mask | fixed
+    if fixed is not None:
+        mask[checks.vertex_ids(fixed, n, "fixed")] = True
     return mask
-
-
-def vertex_ids(chosen, n: int, name: str) -> np.ndarray:
-    """Ids that a mask of ``n`` vertices, or a list of ids, chooses; ``name`` is for the errors."""
-    chosen = np.asarray(chosen)
-    if chosen.dtype == bool:
-        if chosen.shape != (n,):
-            raise ValueError(f"{name} has shape {chosen.shape}, there are {n} vertices")
-        return np.flatnonzero(chosen)
-    if chosen.size and not np.issubdtype(chosen.dtype, np.integer):
-        raise ValueError(f"{name}: neither a mask nor vertex ids")
-    ids = chosen.astype(np.int64).ravel()
-    wrong = ids[(ids < 0) | (ids >= n)]
-    if wrong.size:
-        raise ValueError(f"{name} names vertex {wrong[0]} of {n}")
-    return ids

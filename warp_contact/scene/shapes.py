@@ -5,12 +5,29 @@ from itertools import combinations
 
 import numpy as np
 
+from warp_contact import checks
 from warp_contact.scene.mesh import TetMesh
 
 EVEN = np.array(  # a cube in 5 tets: the corners of even parity carry the middle one
     [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]]
 )  # corner x + 2 y + 4 z
 ODD = EVEN ^ 1  # mirrored in x
+CELLS, BALL = 10_000_000, 200_000  # cells, vertices of a ball: more take all memory
+
+
+def _length(value, name: str) -> float:
+    """A length [m] above zero that a body can have."""
+    return checks.number(value, name, 1e-9, 1e9)
+
+
+def _three(value) -> list:
+    """One value for all three axes, or three."""
+    array = checks.array_of(value)
+    if array.ndim == 0:
+        return [value] * 3
+    if len(array) != 3:
+        raise checks.refuse("size or cells", value, "one number or three")
+    return list(value)
 
 
 def box(size, cells, mirrored: bool = False) -> TetMesh:
@@ -21,10 +38,11 @@ def box(size, cells, mirrored: bool = False) -> TetMesh:
     everywhere, so a block of a few cells has no preferred direction. The usual six tets about one
     space diagonal have one. ``mirrored`` swaps the two colours.
     """
-    size = np.broadcast_to(np.asarray(size, dtype=float), 3)
-    n = np.broadcast_to(np.asarray(cells, dtype=int), 3)
-    if (size <= 0.0).any() or (n < 1).any():
-        raise ValueError(f"a box needs positive sizes and cells, got {size} and {n}")
+    size = [_length(s, "size") for s in _three(size)]
+    n = [checks.count(k, "cells", most=CELLS) for k in _three(cells)]
+    checks.flag(mirrored, "mirrored")
+    if np.prod(n, dtype=float) > CELLS:
+        raise checks.refuse("cells", cells, f"fewer: {CELLS} in all at most")
     axis = [np.linspace(-0.5 * s, 0.5 * s, k + 1) for s, k in zip(size, n, strict=True)]
     vertices = np.stack(np.meshgrid(*axis, indexing="ij"), axis=-1).reshape(-1, 3)
     cell = np.stack(np.meshgrid(*map(np.arange, n), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -43,8 +61,7 @@ def sphere(radius: float, vertices: int = 41) -> TetMesh:
     1415, 2057, ... The one of 41 has 37 vertices and 70 triangles on its surface. The others are an
     icosahedron of 20 regular tets, each refined n times and blown up shell by shell.
     """
-    if not radius > 0.0 or vertices < 1:
-        raise ValueError(f"a sphere needs a positive radius and count, got {radius} and {vertices}")
+    radius, vertices = _length(radius, "radius"), checks.count(vertices, "vertices", most=BALL)
     n = 1
     while abs(_shell_count(n + 1) - vertices) < abs(_shell_count(n) - vertices):
         n += 1
@@ -59,10 +76,9 @@ def cylinder(radius: float, height: float, rings: int = 2, layers: int | None = 
     Discs of ``rings`` hexagonal rings of vertices, ``layers`` of prisms between them (as many as
     make them about as high as wide), each prism in three tets.
     """
-    if not (radius > 0.0 and height > 0.0):
-        raise ValueError(f"a cylinder needs sizes above zero, got {radius} and {height}")
+    radius, height = _length(radius, "radius"), _length(height, "height")
     if layers is None:
-        layers = max(1, round(height * rings / radius))
+        layers = max(1, round(height * checks.count(rings, "rings", most=CELLS) / radius))
     rho, theta, zeta, tets = drum(rings, layers)
     across = radius * rho
     z = height * (zeta - 0.5)
@@ -75,8 +91,8 @@ def dish(radius: float, depth: float, thickness: float, rings: int = 8, layers: 
     ``radius`` [m] is that of the inner rim and ``depth`` [m] that of the hollow; the wall of
     ``thickness`` [m] lies outside of it. The axis is z, the lowest point of the outside is at 0.
     """
-    if not (radius > 0.0 and depth > 0.0 and thickness > 0.0):
-        raise ValueError(f"a dish needs sizes above zero, got {radius}, {depth}, {thickness}")
+    radius, depth = _length(radius, "radius"), _length(depth, "depth")
+    thickness = _length(thickness, "thickness")
     curve = 0.5 * (radius**2 + depth**2) / depth
     rho, theta, zeta, tets = drum(rings, layers)
     polar = rho * 2.0 * np.arctan2(depth, radius)
@@ -91,8 +107,10 @@ def drum(rings: int, layers: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
 
     A body with an axis is a map of these: a cylinder, a dish, a capsule.
     """
-    if rings < 1 or layers < 1:
-        raise ValueError(f"a drum needs one ring and one layer or more, got {rings} and {layers}")
+    rings = checks.count(rings, "rings", most=CELLS)
+    layers = checks.count(layers, "layers", most=CELLS)
+    if 6.0 * rings**2 * layers > CELLS:
+        raise checks.refuse("rings and layers", (rings, layers), f"fewer: {CELLS} prisms at most")
     rho, theta, colour, triangles = _disc(rings)
     n = len(rho)
     order = np.argsort(colour[triangles], axis=1)

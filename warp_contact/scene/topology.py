@@ -9,6 +9,7 @@ import numpy as np
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward, opposite to corner 0..3
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 HUGE = 1e12  # beyond it a position [m] has no place in float32
+MOST = 2**29  # vertices or tets: corners of tets are counted in int32
 FLAT = 1e-7  # |volume| over longest edge^3 [-]: below it a tet has no shape in float32
 
 
@@ -29,21 +30,23 @@ def signed_volumes(x: np.ndarray, tets: np.ndarray) -> np.ndarray:
 
 
 def as_arrays(vertices, tets) -> tuple[np.ndarray, np.ndarray]:
-    """Own copies, with the shape and the range checked."""
+    """Own copies, with the types, the shape and the range checked."""
     try:
-        x, raw = np.array(vertices, dtype=np.float64), np.asarray(tets)
+        x, raw = np.asarray(vertices), np.asarray(tets)
     except (TypeError, ValueError) as error:
         raise MeshError(f"vertices or tets are not arrays of numbers: {error}") from error
-    if x.ndim != 2 or x.shape[1] != 3:
+    if x.dtype.kind not in "fiu":
+        raise MeshError(f"vertices have type {x.dtype}, expected real numbers")
+    if x.ndim != 2 or x.shape[1] != 3 or len(x) > MOST:
         raise MeshError(f"vertices have shape {x.shape}, expected (n, 3)")
-    if raw.ndim != 2 or raw.shape[1] != 4 or len(raw) == 0:
+    if raw.ndim != 2 or raw.shape[1] != 4 or not 0 < len(raw) <= MOST:
         raise MeshError(f"tets have shape {raw.shape}, expected (m, 4) with m > 0")
     if raw.dtype.kind not in "iu":
         raise MeshError(f"tets have type {raw.dtype}, expected integers")
     bad = np.flatnonzero(((raw < 0) | (raw >= len(x))).any(axis=1))
     if len(bad):
         raise MeshError(f"tet {bad[0]} is {raw[bad[0]].tolist()}: index outside 0..{len(x) - 1}")
-    return x, raw.astype(np.int32)
+    return x.astype(np.float64), raw.astype(np.int32)
 
 
 def check_elements(x: np.ndarray, tets: np.ndarray) -> None:

@@ -1,7 +1,8 @@
 """How bodies respond to contact: what ``Simulation(response=...)`` takes."""
 
-import math
 from dataclasses import dataclass
+
+from warp_contact import checks
 
 
 @dataclass(frozen=True)
@@ -19,10 +20,8 @@ class ContactSurface:
 
     def __post_init__(self):
         """Raise ValueError for an unknown search or a number of iterations below 2."""
-        if self.search not in ("balanced", "literal"):
-            raise ValueError(f"search '{self.search}' is neither 'balanced' nor 'literal'")
-        if int(self.iterations) != self.iterations or self.iterations < 2:
-            raise ValueError(f"iterations {self.iterations} is not a count of 2 or more")
+        checks.one_of(self.search, ("balanced", "literal"), "search")
+        checks.count(self.iterations, "iterations", least=2, most=1000)
 
 
 @dataclass(frozen=True)
@@ -44,10 +43,8 @@ class Penalty:
 
     def __post_init__(self):
         """Raise ValueError unless stiffness > 0 and damping >= 0."""
-        if not (math.isfinite(self.stiffness) and self.stiffness > 0.0):
-            raise ValueError(f"penalty stiffness {self.stiffness} is not positive")
-        if not (math.isfinite(self.damping) and self.damping >= 0.0):
-            raise ValueError(f"penalty damping {self.damping} is negative")
+        checks.positive(self.stiffness, "penalty stiffness")
+        checks.number(self.damping, "penalty damping", least=0.0)
 
 
 @dataclass(frozen=True)

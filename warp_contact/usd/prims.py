@@ -5,11 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
 
+from warp_contact import checks
+
 PALETTE = ("4c86b8", "6fa868", "dfb84e", "9579b6", "48a39b", "c9a57d", "c487a6", "71849f")  # sRGB
 FIXED, GROUND = "c4c4c0", "b9b9b5"  # sRGB
 WARM, HOT = "f08a24", "c3241c"  # sRGB, at half and at full pressure
 ROOM = 4.0  # half the width of a drawn half-space, in scene diagonals
 FOV = 28.0  # vertical angle of view [degrees]
+FLAGS = ("velocities", "tets", "flatten", "animate_tets", "resume")  # of a UsdWriter
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,18 @@ class Part:
     def n_vert(self) -> int:
         """Number of its vertices."""
         return self.verts[1] - self.verts[0]
+
+
+def check_options(sim, view, pressure_scale, flags: tuple) -> None:
+    """Refuse options of a ``UsdWriter`` that cannot work, by ValueError; ``flags`` as ``FLAGS``."""
+    if isinstance(sim, type) or not hasattr(sim, "contact_fields"):
+        raise checks.refuse("sim", sim, "a wc.Simulation")
+    if pressure_scale is not None:
+        checks.positive(pressure_scale, "pressure_scale")
+    if view is not None and (not isinstance(view, tuple | list) or len(view) != 2):
+        raise checks.refuse("view", view, "eye and target, three numbers each")
+    for name, value in zip(FLAGS, flags, strict=True):
+        checks.flag(value, name)
 
 
 def linear(srgb: str) -> np.ndarray:
@@ -229,7 +244,10 @@ def add_plane(stage, path: str, n: np.ndarray, h: float, x: np.ndarray, look) ->
 
 
 def add_camera(stage, eye, target) -> None:
-    """A camera at ``eye`` that looks at ``target``."""
+    """A camera at ``eye`` that looks at ``target`` [m]; raises ValueError for no direction."""
+    eye, target = (checks.numbers(p, (3,), n) for p, n in ((eye, "eye"), (target, "target")))
+    if np.linalg.norm(eye - target) < checks.SMALLEST:
+        raise checks.refuse("eye", eye.tolist(), "another place than that of the target")
     camera = UsdGeom.Camera.Define(stage, "/World/view")
     note(camera, "eye", Sdf.ValueTypeNames.Point3d, tuple(map(float, eye)))
     note(camera, "target", Sdf.ValueTypeNames.Point3d, tuple(map(float, target)))

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
+from warp_contact import checks
+
 
 @dataclass(frozen=True)
 class Body:
@@ -19,7 +21,7 @@ class Body:
 
 def root_path(path) -> Path:
     """The root layer that ``path``, a directory or a ``.usda`` file, stands for."""
-    path = Path(path).resolve()
+    path = checks.path(path, "path").resolve()
     if path.suffix == ".usda":
         return path
     if path.suffix.startswith(".usd") or path.is_file():

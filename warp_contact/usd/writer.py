@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, UsdGeom, Vt
 
-from warp_contact.usd.prims import heated, parts, topology
+from warp_contact.usd.prims import check_options, heated, parts, topology
 from warp_contact.usd.reader import frame_numbers, open_stage, read_bodies, root_path
 
 LEVELS = 1000  # distinct values of a scalar in a frame: the crate format packs up to about 1024
@@ -61,11 +61,11 @@ class UsdWriter:
             ValueError: the path is that of another file, or the file to resume has no such
                 frame or other bodies
         """
-        self.root = root_path(path)
-        self.sim, self.velocities, self.flatten = sim, velocities, flatten
+        check_options(sim, view, pressure_scale, (velocities, tets, flatten, animate_tets, resume))
+        self.root, self.sim = root_path(path), sim
+        self.velocities, self.flatten = velocities, flatten
         self.animate_tets = animate_tets and tets
-        self.start = self.end = None
-        self.parts = parts(sim.model)
+        self.start, self.end, self.parts = None, None, parts(sim.model)
         self.base = np.concatenate([np.tile(p.color, (p.n_vert, 1)) for p in self.parts])
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
         self.grows, self.layer = self.scale == 0.0, self._declare()

@@ -1,0 +1,154 @@
+"""Reads mesh files with the libraries of others, as a program of its own: ``files.py`` starts it.
+
+    python reading.py meshio|usd|stage PATH PRIM BYTES
+
+Damaged files make such libraries hang, crash or take all memory. Here that can be ended, and the
+process that asked lives on. Nothing of ``warp_contact`` is imported, which would take a second.
+
+What goes to stdout is ``+`` and an ``.npz`` archive, or ``-`` and what is wrong with the file.
+"""
+
+import io
+import math
+import os
+import re
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+
+VOLUMES = ("tetra", "pyramid", "wedge", "hexahedron")  # and digits: cells that hold tets
+
+
+class Unfit(Exception):
+    """What is wrong with a file, in words for its user."""
+
+
+def main(kind: str, path: str, prim: str, limit: str) -> int:
+    """Read a file and write what is in it to stdout."""
+    out = os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)  # libraries print
+    os.dup2(nowhere, 2)
+    limit_memory(int(limit))
+    printed = io.StringIO()
+    try:
+        with redirect_stdout(printed), redirect_stderr(printed):
+            answer = b"+" + READERS[kind](path, prim)
+    except Unfit as error:
+        answer = b"-" + str(error).encode(errors="replace")
+    except MemoryError:
+        answer = b"-asks for more memory than a file of its size can need: it is damaged"
+    except (Exception, SystemExit) as error:
+        left = isinstance(error, SystemExit)  # as meshio does once it has printed why
+        text = printed.getvalue() if left else f"{type(error).__name__}: {error}"
+        reason = " ".join(text.split())[:200]
+        wrong = f"cannot be read ({reason}): it is damaged, or its name has the wrong ending"
+        answer = b"-" + wrong.encode(errors="replace")
+    with out:
+        out.write(answer)
+    return 0
+
+
+def limit_memory(size: int) -> None:
+    """Let this process have ``size`` bytes, where the system can limit it, and leave no core."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    for what, most in (resource.RLIMIT_AS, size), (resource.RLIMIT_CORE, 0):
+        hard = resource.getrlimit(what)[1]
+        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(what, (most, hard))
+
+
+def packed(**arrays) -> bytes:
+    """Arrays as the bytes of an ``.npz`` archive."""
+    import numpy as np
+
+    if any(array.dtype.hasobject for array in arrays.values()):
+        raise Unfit("holds rows of different lengths where all must have the same")
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+def read_meshio(path: str, _) -> bytes:
+    """``points``, the blocks of volume cells as ``<number>.<name>``, ``others`` in words."""
+    import meshio
+    import numpy as np
+
+    if not path.lower().endswith(tuple(meshio.extension_to_filetypes)):
+        raise Unfit("its name has no ending that meshio knows, such as .msh, .vtk or .vtu")
+    mesh = meshio.read(path)
+    arrays, others = {"points": np.asarray(mesh.points)}, []
+    for k, block in enumerate(mesh.cells):
+        if block.type.rstrip("0123456789") in VOLUMES:
+            arrays[f"{k}.{block.type}"] = np.asarray(block.data)
+        else:
+            others.append(f"{len(block.data)} {block.type}")
+    return packed(**arrays, others=np.array(", ".join(others)))
+
+
+def read_usd(path: str, prim: str) -> bytes:
+    """``points`` [m] with z up and ``tets`` of a TetMesh; ``has_unit``: whether the file has one.
+
+    It is the first one or that at the path ``prim``, as placed at the earliest time.
+    """
+    import numpy as np
+    from pxr import Usd, UsdGeom
+
+    stage = opened(path)
+    found = [p for p in stage.Traverse() if p.IsA(UsdGeom.TetMesh)]
+    found = [p for p in found if not prim or str(p.GetPath()) == prim]
+    if not found:
+        surfaces = sum(p.IsA(UsdGeom.Mesh) for p in stage.Traverse())
+        beside = f"; of its {surfaces} surface meshes it is not said how to fill them with tets"
+        raise Unfit(f"holds no TetMesh{f' at {prim}' if prim else ''}{beside if surfaces else ''}")
+    time = Usd.TimeCode.EarliestTime()
+    tetmesh = UsdGeom.TetMesh(found[0])
+    points = np.array(tetmesh.GetPointsAttr().Get(time), dtype=float)
+    tets = np.array(tetmesh.GetTetVertexIndicesAttr().Get(time))
+    if points.ndim != 2 or tets.ndim != 2 or not points.size or not tets.size:
+        raise Unfit(f"the TetMesh {found[0].GetPath()} has no points or no tets")
+    place = np.array(tetmesh.ComputeLocalToWorldTransform(time))  # acts on row vectors
+    if not (place[:, 3] == (0.0, 0.0, 0.0, 1.0)).all() or not np.isfinite(place).all():
+        raise Unfit(f"the transform of {found[0].GetPath()} is not affine and finite")
+    has_unit = stage.HasAuthoredMetadata("metersPerUnit")
+    unit = UsdGeom.GetStageMetersPerUnit(stage) if has_unit else 1.0
+    if not (math.isfinite(unit) and unit > 0.0):
+        raise Unfit(f"its metersPerUnit is {unit}: write a number above zero into it")
+    with np.errstate(over="ignore", invalid="ignore"):
+        x = unit * (points @ place[:3, :3] + place[3, :3])
+    if stage.HasAuthoredMetadata("upAxis") and UsdGeom.GetStageUpAxis(stage) == "Y":
+        x = x[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
+    return packed(points=x, tets=tets, has_unit=np.array(has_unit))
+
+
+def read_stage(path: str, frames: str) -> bytes:
+    """Read every attribute at the earliest time, or at all: what can hang or crash does so here."""
+    from pxr import Usd
+
+    stage = opened(path)
+    for prim in stage.Traverse():
+        for attribute in prim.GetAttributes():
+            attribute.Get(Usd.TimeCode.EarliestTime())
+            for time in attribute.GetTimeSamples() if frames == "all" else ():
+                attribute.Get(time)
+    return b""
+
+
+def opened(path: str):
+    """A stage; raises Unfit where USD cannot read it."""
+    from pxr import Tf, Usd
+
+    try:
+        return Usd.Stage.Open(path)
+    except Tf.ErrorException as error:
+        said = re.findall(r" : '(.*?)'\s*(?:\n|$)", str(error), re.DOTALL)
+        reason = f" ({' '.join(said[0].split())[:200]})" if said else ""
+        raise Unfit(f"is not a readable USD file{reason}") from error
+
+
+READERS = {"meshio": read_meshio, "usd": read_usd, "stage": read_stage}
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,62 @@
+"""Bodies and vertices that a user names, as the model numbers them."""
+
+from numbers import Integral
+
+import numpy as np
+
+from warp_contact import checks
+from warp_contact.data.model import Model
+from warp_contact.scene import placement
+from warp_contact.scene.scene import Body, Scene
+
+
+class Bodies:
+    """The bodies of a scene: each may be given as itself, by its label or by its index."""
+
+    def __init__(self, model: Model, scene: Scene):
+        """Of a scene and its model."""
+        self._model, self._scene = model, scene
+
+    def range(self, body: Body | int | str | None) -> slice:
+        """The vertices of a body; None for all."""
+        if body is None:
+            return slice(None)
+        index = self.index(body)
+        first, last = self._model.body_vert.numpy()[index : index + 2].tolist()
+        return slice(first, last)
+
+    def index(self, body: Body | int | str) -> int:
+        """The number of a body; raises ValueError where there is no such body."""
+        model = self._model
+        if isinstance(body, str):
+            if body not in model.labels:
+                known = ", ".join(model.labels)
+                raise ValueError(f"there is no body '{body}': the scene has {known}")
+            body = model.labels.index(body)
+        if not isinstance(body, Body | Integral) or isinstance(body, bool):
+            raise checks.refuse("body", body, "a body, its label or its index")
+        index = body.index if isinstance(body, Body) else int(body)
+        if not 0 <= index < model.n_body:
+            raise ValueError(f"there is no body {index}: the scene has {model.n_body}")
+        if isinstance(body, Body) and body is not self._scene.bodies[index]:
+            raise ValueError(f"body '{body.label}' is of another scene")
+        return index
+
+    def label(self, body: Body | int | str) -> str:
+        """The label of a body."""
+        return self._model.labels[self.index(body)]
+
+    def choose(self, values: np.ndarray, body, vertices) -> tuple[np.ndarray, np.ndarray]:
+        """A body's part of the values, as a view, and the vertices that are chosen of it."""
+        part = values[self.range(body)]
+        of = "the scene" if body is None else f"body '{self.label(body)}'"
+        name = f"vertices of {of}"
+        every = np.arange(len(part))
+        return part, every if vertices is None else checks.vertex_ids(vertices, len(part), name)
+
+    def refuse_far(self, x: np.ndarray, body) -> None:
+        """Raise ValueError where one body, or any, is further away than a scene may have it."""
+        bodies = range(self._model.n_body) if body is None else [self.index(body)]
+        edge = self._model.body_edge.numpy()
+        for b in bodies:
+            placement.check_distance(x[self.range(b)], float(edge[b]), self._model.labels[b])

@@ -6,12 +6,22 @@ from pathlib import Path
 
 import warp as wp
 
+from warp_contact.command.warned import warned
 from warp_contact.errors import UsageError
 from warp_contact.picture.files import animate
 from warp_contact.picture.render import render
+from warp_contact.scene.files import in_child, regular
 from warp_contact.scene.mesh import TetMesh
 from warp_contact.usd.check import problems
-from warp_contact.usd.reader import frame_numbers, open_stage, read_bodies
+from warp_contact.usd.reader import (
+    frame_numbers,
+    frame_rate,
+    only_root,
+    open_stage,
+    read_bodies,
+    root_path,
+    usd_errors,
+)
 
 
 def scenes(args) -> int:
@@ -30,26 +40,41 @@ def info(args) -> int:
     path = Path(args.file)
     if not path.exists():
         raise UsageError(f"no such file: {path}")
-    if path.is_dir() or path.suffix.startswith(".usd"):
-        stage = open_stage(path)
-        bodies = read_bodies(stage) if stage.GetDefaultPrim() else []
-        if bodies:
-            return stage_info(stage, bodies)
+    if path.is_dir() or path.suffix.lower().startswith(".usd"):
+        with usd_errors(path):
+            stage = readable_stage(path)
+            bodies = read_bodies(stage)
+            if bodies:
+                return stage_info(stage, bodies)
     return mesh_info(path)
+
+
+def readable_stage(path: Path, frames: str = "first"):
+    """The stage at a path, once another process could read it: the first frame, or ``all``.
+
+    Raises:
+        OSError: it cannot be opened
+        ValueError: to read it takes for ever, or breaks down
+    """
+    root = path
+    if path.is_dir():
+        root = root_path(path) if root_path(path).exists() else only_root(path)
+    beside = [root, *root.parent.glob("*.usdc"), *root.parent.glob("frames/*.usdc")]
+    size = sum(file.stat().st_size for file in beside if file.is_file())
+    in_child("stage", regular(root), frames, size)
+    return open_stage(path)
 
 
 def stage_info(stage, bodies) -> int:
     """Print the frames and bodies of a stage."""
-    frames, fps = frame_numbers(stage), stage.GetTimeCodesPerSecond()
+    frames, fps = frame_numbers(stage), frame_rate(stage)
     rows = []
     for body in bodies:
-        points, faces = (
-            body.mesh.GetPointsAttr().Get(frames[0]),
-            body.mesh.GetFaceVertexCountsAttr(),
-        )
-        tets = len(body.sim.GetTetVertexIndicesAttr().Get()) if body.sim else 0
-        vertices = len(body.sim.GetPointsAttr().Get()) if body.sim else len(points)
-        rows.append((body, vertices, len(faces.Get()), tets))
+        points = body.mesh.GetPointsAttr().Get(frames[0])
+        faces = body.mesh.GetFaceVertexCountsAttr().Get()
+        tets = body.sim.GetTetVertexIndicesAttr().Get() if body.sim else None
+        vertices = body.sim.GetPointsAttr().Get() if body.sim else points
+        rows.append((body, *(len(part or ()) for part in (vertices, faces, tets))))
     vertices, triangles, tets = (sum(row[k] for row in rows) for k in (1, 2, 3))
     print(f"file    {stage.GetRootLayer().realPath}")
     print(f"frames  {frames[0]} to {frames[-1]}, {fps:g} a second, {(len(frames) - 1) / fps:g} s")
@@ -63,11 +88,14 @@ def stage_info(stage, bodies) -> int:
 
 def mesh_info(path: Path) -> int:
     """Print the counts, volume and quality of a tet mesh."""
-    mesh = TetMesh.load(path)
+    with warned():
+        mesh = TetMesh.load(path)
     low, high = mesh.vertices.min(0), mesh.vertices.max(0)
     print(f"file     {path}")
     print(f"counts   {len(mesh.vertices)} vertices, {len(mesh.tets)} tets, ", end="")
     print(f"{len(mesh.surface)} surface triangles")
+    if mesh.n_pieces > 1 or len(mesh.seams):
+        print(f"pieces   {mesh.n_pieces}, {len(mesh.seams)} pairs of vertices in the same place")
     print(f"size     {' x '.join(f'{d:.6g}' for d in high - low)} m, volume {mesh.volume:.6g} m^3")
     print(f"quality  {mesh.quality.min():.3f} to {mesh.quality.max():.3f} (1: regular, 0: flat)")
     return 0
@@ -77,23 +105,25 @@ def draw(args) -> int:
     """Draw pictures."""
     if not Path(args.file).exists():
         raise UsageError(f"no such file: {args.file}")
-    stage = open_stage(args.file)
-    try:
-        wp.get_device(args.device)
-        frames = chosen_frames(args.frames, frame_numbers(stage))
-    except ValueError as error:
-        raise UsageError(str(error)) from error
     kinds = [kind for kind in ("webp", "gif") if getattr(args, kind)]
     if kinds and importlib.util.find_spec("PIL") is None:
         raise UsageError("animations need Pillow: pip install 'warp_contact[render]'")
-    root = Path(stage.GetRootLayer().realPath)
-    out = args.out or root.parent / "pictures"
-    looks = {"samples": args.samples, "wire": args.wire, "device": args.device}
-    if not args.quiet:
-        looks["report"] = lambda path: print(path, flush=True)
-    pictures = render(stage, out, frames, args.size, args.eye, args.target, **looks)
+    with usd_errors(args.file):
+        stage = readable_stage(Path(args.file), "all")
+        every = frame_numbers(stage)
+        try:
+            wp.get_device(args.device)
+            frames = chosen_frames(args.frames, every)
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+        rate = frame_rate(stage) * len(frames) / max(1, frames[-1] - frames[0] + 1)
+        root = Path(stage.GetRootLayer().realPath)
+        out = args.out or root.parent / "pictures"
+        looks = {"samples": args.samples, "wire": args.wire, "device": args.device}
+        if not args.quiet:
+            looks["report"] = lambda path: print(path, flush=True)
+        pictures = render(stage, out, frames, args.size, args.eye, args.target, **looks)
     for kind in kinds:
-        rate = stage.GetTimeCodesPerSecond() * len(frames) / max(1, frames[-1] - frames[0] + 1)
         animate(pictures, out / f"{root.stem}.{kind}", rate)
         if not args.quiet:
             print(out / f"{root.stem}.{kind}")
@@ -130,7 +160,11 @@ def validate(args) -> int:
     """Check a file and print what is wrong with it."""
     if not Path(args.file).exists():
         raise UsageError(f"no such file: {args.file}")
-    found = problems(args.file)
+    try:
+        readable_stage(Path(args.file), "all")
+        found = problems(args.file)
+    except (OSError, ValueError) as error:
+        found = [str(error)]
     for line in found:
         print(line)
     if not found:

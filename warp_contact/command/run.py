@@ -17,7 +17,10 @@ from types import ModuleType
 
 import numpy as np
 
+from warp_contact import checks
 from warp_contact.command.lock import RunLock
+from warp_contact.command.scene_file import check_scene_file
+from warp_contact.command.warned import warned
 from warp_contact.errors import UsageError
 from warp_contact.progress import Progress, announce
 from warp_contact.scene.scene import Scene
@@ -161,11 +164,13 @@ def load_scene(name: str) -> ModuleType:
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:
+        with warned():
+            spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
         raise UsageError(f"{name}: {type(error).__name__}: {error}") from error
     if not callable(getattr(module, "build", None)):
         raise UsageError(f"{name} has no function build()")
+    check_scene_file(module, name)
     return module
 
 
@@ -192,8 +197,10 @@ def settings(build, pairs: list[str]) -> dict:
 def build_scene(module: ModuleType, name: str, values: dict):
     """The scene; what its ``build`` raises counts as wrong input."""
     try:
-        return module.build(**values)
-    except Exception as error:
+        with warned():
+            scene = module.build(**values)
+        return checks.instance(scene, Scene, "what build() returns,", "a wc.Scene")
+    except (Exception, SystemExit) as error:
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
         raise UsageError(f"scene {name}: {kind}{error}") from error
 

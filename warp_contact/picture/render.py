@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 from pxr import Usd, UsdGeom
 
+from warp_contact import checks
 from warp_contact.picture.files import write_png
 from warp_contact.picture.raycast import Camera, Renderer
 from warp_contact.usd.prims import FOV, PALETTE, linear
@@ -15,6 +16,8 @@ from warp_contact.usd.reader import frame_numbers, open_stage, read_note, read_p
 
 DIRECTION = (0.55, -1.0, 0.5)  # from the scene toward an automatic camera
 VIEW_MARGIN = 1.12  # room around the scene in an automatic view
+FAR = 1e18  # [m]: squares of what is beyond have no place in float32
+WIDEST, FINEST = 16_384, 64  # pixels along a side, rays along a side of one: more take for ever
 
 
 def render(
@@ -32,15 +35,14 @@ def render(
     device=None,
     report=None,
 ) -> list[Path]:
-    """Draw frames of a stage as ``<out_dir>/NNNNNN.png`` and give their paths.
+    """Draw frames of a stage as ``<out_dir>/NNNNNN.png``, give their paths; or raise ValueError.
 
     Args:
         stage: a path that ``usd.open_stage`` takes, or an open stage
         out_dir: made if it is not there
         frames: frame numbers; None takes all
         size: width and height [pixels]
-        eye: position of the camera [m]; None takes the camera of the file or, without one, a
-            place from where all frames are in view
+        eye: position of the camera [m]; None takes that of the file or one that sees all frames
         target: what the camera looks at [m]; None as for ``eye``
         samples: rays along each side of a pixel
         rays: rays of each sample to the sun, and to the sky
@@ -49,6 +51,7 @@ def render(
         device: Warp device
         report: called with each path as it is written
     """
+    size, *quality = checked_quality(size, samples, rays, wire)
     if not isinstance(stage, Usd.Stage):
         stage = open_stage(stage)
     every, drawing = frame_numbers(stage), Drawing.of(stage)
@@ -59,8 +62,18 @@ def render(
     center, reach = 0.5 * (low + high), float(np.linalg.norm(high - low))
     with wp.ScopedDevice(device):
         rest = drawing.points(every[0])
-        renderer = Renderer(drawing.tris, rest, planes, size, samples, rays, wire)
+        renderer = Renderer(drawing.tris, rest, planes, size, *quality)
         return draw(drawing, frames, renderer, (camera, center, reach), Path(out_dir), report)
+
+
+def checked_quality(size, samples, rays, wire) -> tuple:
+    """What a picture costs; raises ValueError for what cannot work."""
+    size = tuple(checks.count(pixels, "size", most=WIDEST) for pixels in size)
+    samples, rays = (
+        checks.count(value, name, most=FINEST)
+        for value, name in ((samples, "samples"), (rays, "rays"))
+    )
+    return size, samples, rays, checks.number(wire, "wire", 0.0, 1.0)
 
 
 def draw(drawing, frames: list[int], renderer: Renderer, view: tuple, out_dir: Path, report):
@@ -85,41 +98,47 @@ def chosen_frames(frames: Iterable[int] | None, every: range) -> list[int]:
 
 @dataclass(frozen=True)
 class Drawing:
-    """The meshes of a stage as one: prims and triangles over all their points."""
+    """The meshes of a stage as one: prims, counts of points, triangles over all points."""
 
     meshes: tuple[UsdGeom.Mesh, ...]
+    sizes: tuple[int, ...]
     tris: np.ndarray
 
     @classmethod
     def of(cls, stage: Usd.Stage) -> "Drawing":
-        """Every visible mesh of a stage that is not a drawn half-space."""
-        meshes, tris, first = [], [], 0
+        """Every visible mesh of a stage that is not a drawn half-space.
+
+        Raises:
+            ValueError: there is none, or its faces do not fit its points
+        """
+        meshes, sizes, tris, first = [], [], [], 0
         time = stage.GetStartTimeCode()
         for prim in stage.Traverse():
             purpose = UsdGeom.Imageable(prim).ComputePurpose() if prim.IsA(UsdGeom.Mesh) else None
             if purpose not in ("default", "render") or read_note(prim, "normal") is not None:
                 continue
             mesh = UsdGeom.Mesh(prim)
-            counts = np.asarray(mesh.GetFaceVertexCountsAttr().Get(time))
-            indices = np.asarray(mesh.GetFaceVertexIndicesAttr().Get(time))
-            tris.append(first + fans(counts, indices))
-            first += len(mesh.GetPointsAttr().Get(time))
+            n = len(mesh.GetPointsAttr().Get(time) or ())
+            tris.append(first + faces(mesh, n, time))
+            sizes.append(n)
+            first += n
             meshes.append(mesh)
-        if not meshes:
-            raise ValueError("nothing to draw: the file has no visible mesh")
-        return cls(tuple(meshes), np.concatenate(tris))
+        if not meshes or not sum(map(len, tris)):
+            raise ValueError("nothing to draw: the file has no visible mesh with faces")
+        return cls(tuple(meshes), tuple(sizes), np.concatenate(tris))
 
     def points(self, frame: float) -> np.ndarray:
-        """Positions [m] at a frame, shape (n_vert, 3)."""
-        return np.concatenate([world_points(mesh, frame) for mesh in self.meshes])
+        """Positions [m] at a frame, shape (n_vert, 3); raises ValueError where there are none."""
+        parts = zip(self.meshes, self.sizes, strict=True)
+        return np.concatenate([world_points(mesh, n, frame) for mesh, n in parts])
 
     def colors(self, frame: float) -> np.ndarray:
         """Linear colours at a frame, shape (n_vert, 3)."""
         result = []
-        for k, mesh in enumerate(self.meshes):
-            n = len(mesh.GetPointsAttr().Get(frame))
+        for k, (mesh, n) in enumerate(zip(self.meshes, self.sizes, strict=True)):
             color = mesh.GetDisplayColorPrimvar().ComputeFlattened(frame)
             color = np.asarray(color if color else [linear(PALETTE[k % len(PALETTE)])])
+            color = np.nan_to_num(np.clip(color, 0.0, 1.0))
             result.append(color if len(color) == n else np.tile(color[:1], (n, 1)))
         return np.concatenate(result)
 
@@ -128,6 +147,17 @@ class Drawing:
         boxes = [(x.min(0), x.max(0)) for x in map(self.points, frames)]
         low, high = zip(*boxes, strict=True)
         return np.min(low, axis=0), np.max(high, axis=0)
+
+
+def faces(mesh: UsdGeom.Mesh, n: int, time: float) -> np.ndarray:
+    """Triangles of a mesh of ``n`` points, shape (n_tri, 3); raises ValueError for wrong ones."""
+    counts = mesh.GetFaceVertexCountsAttr().Get(time) or ()
+    indices = mesh.GetFaceVertexIndicesAttr().Get(time) or ()
+    counts, indices = (np.asarray(values, dtype=np.int64) for values in (counts, indices))
+    fit = (counts >= 0).all() and counts.sum() == len(indices)
+    if not fit or indices.min(initial=0) < 0 or indices.max(initial=-1) >= n:
+        raise ValueError(f"the faces of {mesh.GetPath()} do not fit its {n} points")
+    return fans(counts, indices)
 
 
 def fans(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
@@ -141,22 +171,30 @@ def fans(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
     return np.stack([indices[first], indices[first + k + 1], indices[first + k + 2]], axis=1)
 
 
-def world_points(mesh: UsdGeom.Mesh, frame: float) -> np.ndarray:
-    """Points of a mesh in world coordinates [m], shape (n, 3)."""
+def world_points(mesh: UsdGeom.Mesh, n: int, frame: float) -> np.ndarray:
+    """The ``n`` points of a mesh in world coordinates [m], shape (n, 3)."""
     matrix = np.asarray(mesh.ComputeLocalToWorldTransform(frame))
-    points = np.asarray(mesh.GetPointsAttr().Get(frame))
-    if (matrix == np.eye(4)).all():
-        return points
-    return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
+    points = np.asarray(mesh.GetPointsAttr().Get(frame) or np.zeros((0, 3)), dtype=np.float32)
+    if points.shape != (n, 3):
+        where = f"{mesh.GetPath()} at frame {frame:g}"
+        raise ValueError(f"{where} has {len(points)} points, not {n}: is a file of it missing?")
+    if not (matrix == np.eye(4)).all():
+        points = (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
+    if not (np.abs(points) < FAR).all():
+        raise ValueError(f"{mesh.GetPath()} has points at frame {frame:g} that are not finite")
+    return points
 
 
 def chosen_camera(view, eye, target, low, high, aspect: float) -> Camera:
     """What was asked for, else the camera of the file, else one that sees everything."""
     if eye is None and target is None and view is not None:
-        return Camera(*view)
+        eye, target = view
     fitting = fitting_camera(low, high, aspect)
-    target = fitting.target if target is None else np.asarray(target, dtype=float)
-    eye = target + fitting.eye - fitting.target if eye is None else np.asarray(eye, dtype=float)
+    target = fitting.target if target is None else checks.numbers(target, (3,), "target")
+    away = fitting.eye - fitting.target
+    eye = target + away if eye is None else checks.numbers(eye, (3,), "eye")
+    if np.linalg.norm(eye - target) < checks.SMALLEST:
+        raise checks.refuse("eye", eye.tolist(), "another place than that of the target")
     return Camera(eye, target)
 
 

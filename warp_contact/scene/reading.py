@@ -39,8 +39,7 @@ def main(kind: str, path: str, prim: str, limit: str) -> int:
         answer = b"-asks for more memory than a file of its size can need: it is damaged"
     except (Exception, SystemExit) as error:
         left = isinstance(error, SystemExit)  # as meshio does once it has printed why
-        text = printed.getvalue() if left else f"{type(error).__name__}: {error}"
-        reason = " ".join(text.split())[:200]
+        reason = in_short(printed.getvalue() if left else f"{type(error).__name__}: {error}")
         wrong = f"cannot be read ({reason}): it is damaged, or its name has the wrong ending"
         answer = b"-" + wrong.encode(errors="replace")
     with out:
@@ -143,9 +142,13 @@ def opened(path: str):
     try:
         return Usd.Stage.Open(path)
     except Tf.ErrorException as error:
-        said = re.findall(r" : '(.*?)'\s*(?:\n|$)", str(error), re.DOTALL)
-        reason = f" ({' '.join(said[0].split())[:200]})" if said else ""
-        raise Unfit(f"is not a readable USD file{reason}") from error
+        raise Unfit(f"is not a readable USD file ({in_short(str(error))})") from error
+
+
+def in_short(text: str) -> str:
+    """The essence of an error of another library in one line; USD quotes it among much else."""
+    said = re.findall(r" : '(.*?)'\s*(?:\n|$)", text, re.DOTALL)
+    return " ".join((said or [text])[0].split())[:200]
 
 
 READERS = {"meshio": read_meshio, "usd": read_usd, "stage": read_stage}

@@ -1,7 +1,7 @@
 """Checks of a USD file: the registered validators, and what these do not check."""
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom, UsdUtils, Vt
+from pxr import Usd, UsdGeom, UsdUtils, Vt
 
 from warp_contact.usd.reader import frame_numbers, open_stage, read_note
 
@@ -28,7 +28,7 @@ def problems(path) -> list[str]:
         found += [d.commentary for d in delegate.TakeUncoalescedDiagnostics()]
         # Last: the validators take the template of the clips for a missing file and warn.
         found += registered(stage)
-    except (OSError, Tf.ErrorException) as error:
+    except (OSError, ValueError, RuntimeError) as error:  # of Tf too
         found = [str(error)]
     finally:
         delegate.TakeUncoalescedDiagnostics()

@@ -1,5 +1,8 @@
 """Reads the stages that a ``UsdWriter`` writes."""
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,6 +10,8 @@ import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
 from warp_contact import checks
+
+FRAMES = 1_000_000  # numbers of frames are below: they have six digits
 
 
 @dataclass(frozen=True)
@@ -53,21 +58,50 @@ def only_root(directory: Path) -> Path:
 
 
 def frame_numbers(stage: Usd.Stage) -> range:
-    """The frames of a stage."""
-    return range(round(stage.GetStartTimeCode()), round(stage.GetEndTimeCode()) + 1)
+    """The frames of a stage; raises ValueError where they make no sense."""
+    first, last = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    if not (abs(first) < FRAMES and abs(last) < FRAMES and first <= last):
+        name = stage.GetRootLayer().GetDisplayName()
+        raise ValueError(
+            f"{name} says that its frames go from {first:g} to {last:g}: "
+            f"correct its startTimeCode and endTimeCode"
+        )
+    return range(round(first), round(last) + 1)
+
+
+def frame_rate(stage: Usd.Stage) -> float:
+    """Frames a second; raises ValueError where that is not above zero."""
+    rate = stage.GetTimeCodesPerSecond()
+    if not (rate > 0.0 and np.isfinite(rate)):
+        name = stage.GetRootLayer().GetDisplayName()
+        raise ValueError(f"{name} says {rate:g} frames a second: correct its timeCodesPerSecond")
+    return rate
+
+
+@contextmanager
+def usd_errors(path) -> Iterator[None]:
+    """Errors that USD raises within become one OSError that names the file."""
+    try:
+        yield
+    except Tf.ErrorException as error:
+        said = re.findall(r" : '(.*?)'\s*(?:\n|$)", str(error), re.DOTALL)
+        reason = f" ({' '.join(said[0].split())[:200]})" if said else ""
+        raise OSError(f"{path} is not a readable USD file{reason}") from error
 
 
 def read_bodies(stage: Usd.Stage) -> list[Body]:
-    """The bodies of a stage in the order of their indices."""
+    """The bodies of a stage in the order of their indices; raises ValueError for half a body."""
     found = []
-    for prim in stage.GetDefaultPrim().GetChildren():
-        index = read_note(prim, "body")
+    for prim in stage.GetDefaultPrim().GetChildren() if stage.GetDefaultPrim() else ():
+        index, label = read_note(prim, "body"), read_note(prim, "label")
         if index is None:
             continue
-        sim = prim.GetChild("sim")
+        surface, sim = prim.GetChild("surface"), prim.GetChild("sim")
+        if not isinstance(index, int) or not isinstance(label, str) or not surface:
+            raise ValueError(f"{prim.GetPath()} lacks the number, label or surface of a body")
         body = Body(
-            label=read_note(prim, "label"),
-            mesh=UsdGeom.Mesh(prim.GetChild("surface")),
+            label=label,
+            mesh=UsdGeom.Mesh(surface),
             sim=UsdGeom.TetMesh(sim) if sim else None,
             fixed=bool(read_note(prim, "fixed")),
         )
@@ -82,15 +116,22 @@ def read_points(stage: Usd.Stage, frame: int) -> dict[str, np.ndarray]:
 
 
 def read_planes(stage: Usd.Stage) -> list[tuple[np.ndarray, float]]:
-    """Normal and offset [m] of each half-space."""
-    prims = stage.GetDefaultPrim().GetChildren()
-    pairs = [(read_note(prim, "normal"), read_note(prim, "offset")) for prim in prims]
-    return [(np.array(n), h) for n, h in pairs if n is not None and h is not None]
+    """Normal and offset [m] of each half-space; raises ValueError for one without direction."""
+    found = []
+    for prim in stage.GetDefaultPrim().GetChildren() if stage.GetDefaultPrim() else ():
+        n, h = read_note(prim, "normal"), read_note(prim, "offset")
+        if n is not None and h is not None:
+            n = checks.numbers(n, (3,), f"normal of {prim.GetPath()}")
+            if not n.any():
+                raise ValueError(f"the normal of {prim.GetPath()} is zero")
+            found.append((n, checks.number(h, f"offset of {prim.GetPath()}")))
+    return found
 
 
 def read_view(stage: Usd.Stage) -> tuple[np.ndarray, np.ndarray] | None:
     """Eye and target [m] of the camera, if there is one."""
-    prim = stage.GetDefaultPrim().GetChild("view")
+    root = stage.GetDefaultPrim()
+    prim = root.GetChild("view") if root else None
     if not prim:
         return None
     eye, target = read_note(prim, "eye"), read_note(prim, "target")

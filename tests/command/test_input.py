@@ -80,8 +80,11 @@ def test_a_stage_as_it_should_be_is_read_by_every_command(stage, capsys, tmp_pat
         ({"start": "nan"}, "its frames go from nan to 0"),
         ({"start": "5"}, "its frames go from 5 to 0"),
         ({"rate": "0"}, "invalid value for field"),
-        ({"label": ""}, "/World/b lacks the number, label or surface of a body"),
-        ({"counts": "[3,3,3,2000000000]"}, "the faces of /World/b/surface do not fit its 4 points"),
+        ({"label": ""}, "a.usda: /World/b lacks the number, label or surface of a body"),
+        (
+            {"counts": "[3,3,3,2000000000]"},
+            "a.usda: /World/b/surface do not fit its 4 points",
+        ),
         ({"indices": "[1,2,3,0,3,2,0,1,3,0,2,-9]"}, "do not fit its 4 points"),
         ({"points": "[(nan,0,0), (1,0,0), (0,1,0), (0,0,1)]"}, "that are not finite"),
         ({"points": "[]"}, "do not fit its 0 points"),

@@ -46,6 +46,8 @@ def info(args) -> int:
             bodies = read_bodies(stage)
             if bodies:
                 return stage_info(stage, bodies)
+    if path.is_dir():
+        raise ValueError(f"{path} holds no bodies: it is damaged, or not of a run")
     return mesh_info(path)
 
 

@@ -12,7 +12,14 @@ from warp_contact import checks
 from warp_contact.picture.files import write_png
 from warp_contact.picture.raycast import Camera, Renderer
 from warp_contact.usd.prims import FOV, PALETTE, linear
-from warp_contact.usd.reader import frame_numbers, open_stage, read_note, read_planes, read_view
+from warp_contact.usd.reader import (
+    frame_numbers,
+    open_stage,
+    place,
+    read_note,
+    read_planes,
+    read_view,
+)
 
 DIRECTION = (0.55, -1.0, 0.5)  # from the scene toward an automatic camera
 VIEW_MARGIN = 1.12  # room around the scene in an automatic view
@@ -124,7 +131,8 @@ class Drawing:
             first += n
             meshes.append(mesh)
         if not meshes or not sum(map(len, tris)):
-            raise ValueError("nothing to draw: the file has no visible mesh with faces")
+            name = stage.GetRootLayer().GetDisplayName()
+            raise ValueError(f"nothing to draw: {name} has no visible mesh with faces")
         return cls(tuple(meshes), tuple(sizes), np.concatenate(tris))
 
     def points(self, frame: float) -> np.ndarray:
@@ -156,7 +164,7 @@ def faces(mesh: UsdGeom.Mesh, n: int, time: float) -> np.ndarray:
     counts, indices = (np.asarray(values, dtype=np.int64) for values in (counts, indices))
     fit = (counts >= 0).all() and counts.sum() == len(indices)
     if not fit or indices.min(initial=0) < 0 or indices.max(initial=-1) >= n:
-        raise ValueError(f"the faces of {mesh.GetPath()} do not fit its {n} points")
+        raise ValueError(f"the faces of {place(mesh.GetPrim())} do not fit its {n} points")
     return fans(counts, indices)
 
 
@@ -175,13 +183,15 @@ def world_points(mesh: UsdGeom.Mesh, n: int, frame: float) -> np.ndarray:
     """The ``n`` points of a mesh in world coordinates [m], shape (n, 3)."""
     matrix = np.asarray(mesh.ComputeLocalToWorldTransform(frame))
     points = np.asarray(mesh.GetPointsAttr().Get(frame) or np.zeros((0, 3)), dtype=np.float32)
+    where = f"{place(mesh.GetPrim())} at frame {frame:g}"
     if points.shape != (n, 3):
-        where = f"{mesh.GetPath()} at frame {frame:g}"
         raise ValueError(f"{where} has {len(points)} points, not {n}: is a file of it missing?")
     if not (matrix == np.eye(4)).all():
         points = (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
     if not (np.abs(points) < FAR).all():
-        raise ValueError(f"{mesh.GetPath()} has points at frame {frame:g} that are not finite")
+        raise ValueError(
+            f"{place(mesh.GetPrim())} has points at frame {frame:g} that are not finite"
+        )
     return points
 
 

@@ -132,9 +132,9 @@ def _load_npz(path: Path) -> tuple[np.ndarray, np.ndarray]:
             return tuple(_member(archive, name, *wanted) for name, wanted in ARRAYS.items())
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
-    except OSError:
-        raise
     except Exception as error:
+        if isinstance(error, OSError) and error.filename:  # it cannot be opened
+            raise
         raise MeshError(f"{path}: is not a readable .npz archive: it is damaged") from error
 
 

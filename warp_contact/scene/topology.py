@@ -37,8 +37,8 @@ def as_arrays(vertices, tets) -> tuple[np.ndarray, np.ndarray]:
         raise MeshError(f"vertices or tets are not arrays of numbers: {error}") from error
     if x.dtype.kind not in "fiu":
         raise MeshError(f"vertices have type {x.dtype}, expected real numbers")
-    if x.ndim != 2 or x.shape[1] != 3 or len(x) > MOST:
-        raise MeshError(f"vertices have shape {x.shape}, expected (n, 3)")
+    if x.ndim != 2 or x.shape[1] != 3 or not 0 < len(x) <= MOST:
+        raise MeshError(f"vertices have shape {x.shape}, expected (n, 3) with n > 0")
     if raw.ndim != 2 or raw.shape[1] != 4 or not 0 < len(raw) <= MOST:
         raise MeshError(f"tets have shape {raw.shape}, expected (m, 4) with m > 0")
     if raw.dtype.kind not in "iu":

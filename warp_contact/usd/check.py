@@ -3,7 +3,7 @@
 import numpy as np
 from pxr import Usd, UsdGeom, UsdUtils, Vt
 
-from warp_contact.usd.reader import frame_numbers, open_stage, read_note
+from warp_contact.usd.reader import frame_numbers, in_short, open_stage, read_note
 
 TOPOLOGY = (
     "faceVertexCounts",
@@ -29,7 +29,7 @@ def problems(path) -> list[str]:
         # Last: the validators take the template of the clips for a missing file and warn.
         found += registered(stage)
     except (OSError, ValueError, RuntimeError) as error:  # of Tf too
-        found = [str(error)]
+        found = [in_short(error)]
     finally:
         delegate.TakeUncoalescedDiagnostics()
     return [" ".join(line.split()) for line in dict.fromkeys(found)]

@@ -84,9 +84,18 @@ def usd_errors(path) -> Iterator[None]:
     try:
         yield
     except Tf.ErrorException as error:
-        said = re.findall(r" : '(.*?)'\s*(?:\n|$)", str(error), re.DOTALL)
-        reason = f" ({' '.join(said[0].split())[:200]})" if said else ""
-        raise OSError(f"{path} is not a readable USD file{reason}") from error
+        raise OSError(f"{path} is not a readable USD file ({in_short(error)})") from error
+
+
+def in_short(error: Exception) -> str:
+    """The essence of an error in one line; USD quotes it among much else."""
+    said = re.findall(r" : '(.*?)'\s*(?:\n|$)", str(error), re.DOTALL)
+    return " ".join((said or [str(error)])[0].split())[:300]
+
+
+def place(prim: Usd.Prim) -> str:
+    """File and path of a prim."""
+    return f"{prim.GetStage().GetRootLayer().GetDisplayName()}: {prim.GetPath()}"
 
 
 def read_bodies(stage: Usd.Stage) -> list[Body]:
@@ -98,7 +107,7 @@ def read_bodies(stage: Usd.Stage) -> list[Body]:
             continue
         surface, sim = prim.GetChild("surface"), prim.GetChild("sim")
         if not isinstance(index, int) or not isinstance(label, str) or not surface:
-            raise ValueError(f"{prim.GetPath()} lacks the number, label or surface of a body")
+            raise ValueError(f"{place(prim)} lacks the number, label or surface of a body")
         body = Body(
             label=label,
             mesh=UsdGeom.Mesh(surface),
@@ -121,10 +130,10 @@ def read_planes(stage: Usd.Stage) -> list[tuple[np.ndarray, float]]:
     for prim in stage.GetDefaultPrim().GetChildren() if stage.GetDefaultPrim() else ():
         n, h = read_note(prim, "normal"), read_note(prim, "offset")
         if n is not None and h is not None:
-            n = checks.numbers(n, (3,), f"normal of {prim.GetPath()}")
+            n = checks.numbers(n, (3,), f"normal of {place(prim)}")
             if not n.any():
-                raise ValueError(f"the normal of {prim.GetPath()} is zero")
-            found.append((n, checks.number(h, f"offset of {prim.GetPath()}")))
+                raise ValueError(f"the normal of {place(prim)} is zero")
+            found.append((n, checks.number(h, f"offset of {place(prim)}")))
     return found
 
 

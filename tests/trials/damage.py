@@ -3,9 +3,11 @@
 import io
 import random
 import re
+import shutil
 import struct
 import sys
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -99,3 +101,30 @@ def crafted() -> dict[str, bytes]:
         found[f"empty.{ending}"], found[f"text.{ending}"] = b"", b"hello\n" * 50
         found[f"random.{ending}"] = random.Random(1).randbytes(3000)
     return found
+
+
+def trials(folder: Path, n: int, rng: random.Random) -> Iterator[tuple[str, Path]]:
+    """Commands and paths of crafted and of ``n`` damaged files, each as it is to be read."""
+    whole, run, copy = whole_files(folder / "whole"), folder / "whole" / "run", folder / "copy"
+    (folder / "crafted").mkdir(exist_ok=True)
+    for name, data in crafted().items():
+        (folder / "crafted" / name).write_bytes(data)
+        yield "load", folder / "crafted" / name
+    weights = [20 if file.suffix == ".npz" else 1 for file in whole]  # the others take a process
+    for k in range(n):
+        file = rng.choices(whole, weights)[0]
+        data = damaged(file, rng)
+        shutil.rmtree(copy, ignore_errors=True)
+        if "run" in file.parts:
+            shutil.copytree(run, copy)
+            (copy / "run.usda").rename(copy / "copy.usda")
+            part = copy / file.relative_to(run)
+            part = part.with_name("copy.usda") if part.name == "run.usda" else part
+            part.write_bytes(data)
+            yield rng.choice(["info", "validate", "render"]), copy
+        else:
+            copy.mkdir()
+            (copy / f"damaged{k}{file.suffix}").write_bytes(data)
+            usd = file.suffix.startswith(".usd")
+            choice = ["load", "load", "info", *(["validate", "render"] if usd else [])]
+            yield rng.choice(choice), copy / f"damaged{k}{file.suffix}"

@@ -29,7 +29,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 import damage
 
 FOLDER = Path("out/fuzz").resolve()
-CRAFTED = FOLDER / "crafted"
 SECONDS = 20
 MEMORY = 8 * 2**30  # of the worker [bytes]: libraries reserve some that they do not use
 PLAUSIBLE = 1e6  # sizes [m] beyond are taken with a warning only
@@ -112,40 +111,12 @@ class Worker:
         return ("CRASH", f"exit code {code}") if ready else ("HANG", "")
 
 
-def trials(n: int, rng: random.Random):
-    """Commands and paths of crafted and of ``n`` damaged files, each as it is to be read."""
-    whole, copy = damage.whole_files(FOLDER / "whole"), FOLDER / "copy"
-    CRAFTED.mkdir(exist_ok=True)
-    for name, data in damage.crafted().items():
-        (CRAFTED / name).write_bytes(data)
-        yield "load", CRAFTED / name
-    weights = [20 if file.suffix == ".npz" else 1 for file in whole]  # the others take a process
-    for k in range(n):
-        file = rng.choices(whole, weights)[0]
-        data = damage.damaged(file, rng)
-        shutil.rmtree(copy, ignore_errors=True)
-        if "run" in file.parts:
-            shutil.copytree(FOLDER / "whole" / "run", copy)
-            (copy / "run.usda").rename(copy / "copy.usda")
-            part = copy / file.relative_to(FOLDER / "whole" / "run")
-            part = part.with_name("copy.usda") if part.name == "run.usda" else part
-            part.write_bytes(data)
-            yield rng.choice(["info", "validate", "render"]), copy
-        else:
-            copy.mkdir()
-            (copy / f"damaged{k}{file.suffix}").write_bytes(data)
-            usd = file.suffix.startswith(".usd")
-            choice = ["load", "load", "info", *(["validate", "render"] if usd else [])]
-            yield rng.choice(choice), copy / f"damaged{k}{file.suffix}"
-
-
 def main(n: int, seed: int) -> int:
     """Try all files, name those with faults, count what came."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
     worker, count, faults = Worker(), Counter(), 0
-    for k, (command, path) in enumerate(trials(n, random.Random(seed))):
+    for k, (command, path) in enumerate(damage.trials(FOLDER, n, random.Random(seed))):
         kind, said = worker.ask(command, path)
-        kind = "TAKEN" if kind == "taken" and path.parent == CRAFTED else kind
+        kind = "TAKEN" if kind == "taken" and path.parent.name == "crafted" else kind
         count[command, kind] += 1
         if kind.isupper():
             faults += 1

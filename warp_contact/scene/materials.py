@@ -23,7 +23,7 @@ from warp_contact.scene.topology import EDGES
 OPPOSITE = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))  # opposite to corners 0, 1, 2, 3
 DENSITY = 1e-6, 1e9  # [kg/m^3]; masses and their inverses fit float32 in bodies of any size
 STIFFNESS = 1e-6, 1e15  # of Young's modulus [Pa]
-LONGEST = 1e6  # of damping [s]
+LONGEST = 100.0  # of damping [s]: with more nothing swings, and the stages of damping grow
 
 
 def _check_common(material) -> None:

@@ -9,7 +9,7 @@ from warp_contact.kernels.lengths import REST_GAP, SAME_PLACE
 ROUNDING = 2.0**-24  # of a float32, at most
 DROWNED = 10.0  # resting gaps by which rounding may move a body: soft ones tolerate it
 STRAINED = 0.02  # strain that rounding of the positions may put on a tet
-PLAUSIBLE = 1e-5, 1e3  # size of a body [m]
+PLAUSIBLE = 0.9e-6, 1.1e3  # size of a body [m]; others run too
 
 
 def check_shape(mesh, label: str) -> None:

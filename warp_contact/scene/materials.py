@@ -10,7 +10,7 @@ A model is one kernel file (``kernels/elastic/<model>.py``) and one class here w
 * ``check()``: raises ValueError with a reason.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import ModuleType
 from typing import ClassVar
 
@@ -27,6 +27,9 @@ LONGEST = 100.0  # of damping [s]: with more nothing swings, and the stages of d
 
 
 def _check_common(material) -> None:
+    """Check that all fields are numbers, and density and damping possible ones."""
+    for field in fields(material):
+        checks.number(getattr(material, field.name), field.name)
     checks.number(material.density, "density", *DENSITY)
     checks.number(material.damping, "damping", 0.0, LONGEST)
 

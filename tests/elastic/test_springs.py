@@ -144,5 +144,5 @@ def test_a_collapsed_body_has_finite_forces(shape, mesh, rng, build_model, force
 )
 def test_impossible_numbers_are_refused(numbers):
     SpringNetwork(1.0, 0.0, 1.0, RHO, 1e-3).check()
-    with pytest.raises(ValueError, match=": give a number"):
+    with pytest.raises(ValueError, match=": give a "):
         SpringNetwork(*numbers)

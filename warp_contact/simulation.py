@@ -20,7 +20,7 @@ from warp_contact.scene.selection import Bodies
 from warp_contact.scene.topology import HUGE
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
-RATES = 1e-6, 1e9  # of frames [1/s]
+RATES = 1e-6, 1e12  # of frames [1/s]
 RESPONSES = ContactSurface | Penalty | PredictedForce
 KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce()"
 

@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from command_line import complaint
 
 from warp_contact.command import cli
+from warp_contact.command.commands import chosen_frames
 from warp_contact.scene.shapes import box
 from warp_contact.scene.topology import MeshError
 
@@ -148,6 +149,11 @@ def test_a_scene_file_that_makes_no_scene_is_wrong_usage(text, words, tmp_path, 
     said = complaint(capsys)
     assert words in said and "scene.py" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_frames_are_chosen_of_those_that_are_there_however_many_are_named():
+    assert chosen_frames("0:1000000000000:2", range(5)) == [0, 2, 4]
+    assert chosen_frames("1000000000000:1:-1", range(5)) == [4, 3, 2]
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,12 @@ OPTIONAL = ("unit=", "welded(", "pressure_scale=", ", substeps=", "layers=", "po
 NAMES = {"wc": wc, "np": np, "nan": np.nan, "inf": np.inf, "FOLDER": FOLDER}
 NAMES |= {"mesh": lambda: wc.box(0.1, 2), "sim": lambda: NAMES["_sim"]}
 NAMES |= {"npz": lambda: wc.box(0.1, 2).save(f"{FOLDER}/mesh.npz") or f"{FOLDER}/mesh.npz"}
-NAMES |= {"writer": lambda **given: wc.UsdWriter(f"{FOLDER}/run", NAMES["_sim"], **given)}
+NAMES |= {"writer": lambda **given: wc.UsdWriter(anew(), NAMES["_sim"], **given)}
+
+
+def anew() -> str:
+    """A place for a run where nothing is."""
+    return f"{tempfile.mkdtemp(dir=FOLDER)}/run"
 
 
 def scene() -> wc.Scene:

@@ -151,7 +151,7 @@ def chosen_frames(text: str | None, every: range) -> list[int]:
             first = every[0] if ends[0] is None else ends[0]
             last = end if ends[1] is None else ends[1]
             numbers = range(first, last, *filter(None, parts[2:]))
-            found = [frame for frame in numbers if frame in every]
+            found = [frame for frame in every[:: 1 if numbers.step > 0 else -1] if frame in numbers]
         if not found:
             raise ValueError(f"no frame {item}: the file has {every[0]} to {every[-1]}")
         frames += found

@@ -27,9 +27,8 @@ def masses(sim: Simulation) -> np.ndarray:
 
 def momentum(sim: Simulation) -> np.ndarray:
     """Of the velocities of the steps, half of one before the positions [kg m/s]."""
-    return (masses(sim) * sim.state.v.numpy()[sim._bodies.range("it")]).sum(
-        axis=0, dtype=np.float64
-    )
+    v = sim.state.v.numpy()[sim._bodies.range("it")]
+    return (masses(sim) * v).sum(axis=0, dtype=np.float64)
 
 
 @pytest.mark.parametrize("plane", [True, False], ids=["plane", "body"])

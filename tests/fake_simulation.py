@@ -1,6 +1,5 @@
-"""Moving cubes without a solver for the tests of USD files; as a script it writes until killed."""
+"""Moving cubes without a solver for the tests of USD files."""
 
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -84,18 +83,3 @@ def surface_ids(sim, b):
     """Surface vertices of a body in the flat arrays."""
     tri = sim.model.body_tri.numpy()
     return np.unique(sim.model.tris.numpy()[tri[b] : tri[b + 1]])
-
-
-def write_forever(out: str) -> None:
-    """Write frames in a tight loop and say so after each."""
-    sim = FakeSimulation()
-    writer = UsdWriter(out, sim)
-    print("start", flush=True)
-    while True:
-        writer.write()
-        print(sim.frame, flush=True)
-        sim.frame += 1
-
-
-if __name__ == "__main__":
-    write_forever(sys.argv[1])

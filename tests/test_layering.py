@@ -14,21 +14,23 @@ SCENES = sorted((ROOT / "scenes").glob("*.py"))
 
 MAY = {  # room: those that it may import, beside itself
     "errors": set(),
+    "files": set(),
+    "interrupts": set(),
     "progress": set(),
     "exclusive": set(),
     "checks": set(),
     "data": {"kernels"},
     "scene": {"kernels", "data", "checks"},
     "step": {"kernels", "data", "checks"},
-    "frame": {"kernels", "data", "step", "errors"},
+    "frame": {"kernels", "data", "step", "errors", "files"},
     "measure": {"kernels", "data", "scene", "step"},
-    "usd": {"checks"},
+    "usd": {"checks", "files"},
     "picture": {"kernels", "usd", "checks"},
     "simulation": {"data", "scene", "step", "frame", "measure"}
     | {"errors", "progress", "exclusive", "checks"},
-    "__init__": {"scene", "step", "measure", "usd", "simulation", "errors"},
-    "command": {"__init__", "errors", "progress", "scene", "step", "simulation", "usd", "picture"}
-    | {"checks"},
+    "__init__": {"scene", "step", "measure", "usd", "simulation", "errors", "interrupts"},
+    "command": {"__init__", "errors", "files", "interrupts", "progress", "scene", "step"}
+    | {"simulation", "usd", "picture", "checks"},
     "__main__": {"command"},
 }
 LADDER = (  # of the kernel rooms: each may import those before it

@@ -1,5 +1,6 @@
 """Contact between deformable bodies by contact surfaces, on NVIDIA Warp."""
 
+from warp_contact import interrupts  # noqa: F401  first, as the others take a second
 from warp_contact.errors import SimulationError
 from warp_contact.measure.measure import Measure
 from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork

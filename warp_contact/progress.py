@@ -2,6 +2,7 @@
 
 import sys
 import time
+from contextlib import suppress
 from typing import TextIO
 
 INTERVAL = 0.1  # between two writes of the line [s]
@@ -44,8 +45,7 @@ class Progress:
     def close(self) -> None:
         """End the line."""
         if self.active and self.width:
-            self.stream.write("\n")
-            self.stream.flush()
+            self._put("\n")
             self.width = 0
 
     def __enter__(self):
@@ -59,17 +59,25 @@ class Progress:
     def _write(self, text: str) -> None:
         """Replace the line."""
         if self.active:
-            self.stream.write("\r" + text.ljust(self.width))
-            self.stream.flush()
+            self._put("\r" + text.ljust(self.width))
             self.width = len(text)
+
+    def _put(self, text: str) -> None:
+        """Write; a terminal that is gone ends the line, not the run."""
+        try:
+            self.stream.write(text)
+            self.stream.flush()
+        except OSError:
+            self.active = False
 
 
 def announce(text: str, quiet: bool = False, stream: TextIO | None = None) -> None:
     """Write a line where ``Progress`` would: what a terminal is to show before the first frame."""
     stream = sys.stderr if stream is None else stream
     if not quiet and stream.isatty():
-        stream.write(text + "\n")
-        stream.flush()
+        with suppress(OSError):  # a terminal that is gone
+            stream.write(text + "\n")
+            stream.flush()
 
 
 def clock(seconds: float) -> str:

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import dataclass, fields
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +16,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from command_line import blocks, complaint
 
-from warp_contact.command import cli, commands, run
+from warp_contact import Measure
+from warp_contact.command import cli, commands, metrics, run
 from warp_contact.errors import SimulationError, UsageError
 from warp_contact.progress import Progress, announce, clock
 from warp_contact.scene.shapes import box
@@ -42,9 +44,11 @@ def test_run_writes_every_frame_and_its_metrics(tmp_path, scene, capsys):
     lines = [json.loads(line) for line in (out / "metrics.jsonl").read_text().splitlines()]
     assert [line["frame"] for line in lines] == [0, 1, 2, 3]
     assert [line["time"] for line in lines] == pytest.approx([0.0, 1 / 60, 2 / 60, 3 / 60])
-    wanted = {"kinetic", "elastic", "gravitational", "momentum", "angular_momentum", "overlap"}
-    wanted |= {"overlap_pair", "n_contacts", "volume_ratio", "forces"}
-    assert wanted <= set(lines[3])
+    figures = {name for name in dir(Measure) if not name.startswith("_")}
+    figures |= {field.name for field in fields(Measure)}
+    assert set(lines[3]) == {"frame", "time"} | figures
+    energies = [lines[3][name] for name in ("kinetic", "elastic", "gravitational")]
+    assert lines[3]["energy"] == sum(energies)
     # Free fall over a few steps of 1/60 s: the block only gains speed.
     assert lines[3]["kinetic"] > lines[2]["kinetic"] > lines[0]["kinetic"] == 0.0
 
@@ -103,6 +107,11 @@ def test_an_interrupt_is_130(tmp_path, scene, capsys, monkeypatch):
         (["run", "SCENE", "--out", "x", "--set", "gap='a'"], "TypeError"),
         (["run", "SCENE", "--out", "x", "--device", "cuda:77"], "unknown device 'cuda:77'"),
         (["run", "SCENE", "--out", "x.usdc"], "x.usdc"),
+        (["run", "SCENE", "--out", ""], "the path is empty"),
+        (["render", "x", "--out", ""], "the path is empty"),
+        (["run", "SCENE", "--out", "x/new\nline"], "control character"),
+        (["run", "SCENE", "--out", "/dev/null/x"], "Not a directory"),
+        (["run", "SCENE", "--out", "x", "--resume", "--overwrite"], "not allowed with"),
         (["run", "SCENE", "--out", "x", "--resume"], "nothing to resume"),
         (["info", "nothing.npz"], "no such file: nothing.npz"),
         (["render", "nothing"], "no such file: nothing"),
@@ -197,8 +206,25 @@ def test_frames_that_are_not_there_are_refused(text):
 
 
 def test_metrics_take_what_json_does_not():
-    values = [run.plain(v) for v in (np.float32(0.5), np.inf, np.array([1.0, np.nan]), None, 3)]
+    values = [metrics.plain(v) for v in (np.float32(0.5), np.inf, np.array([1.0, np.nan]), None, 3)]
     assert values == [0.5, None, [1.0, None], None, 3]
+    forces = {("ball", "finger"): 2.0, ("ball", "plane0"): np.nan, ("finger", "plane0"): 1.0}
+    found = {"ball": {"finger": 2.0, "plane0": None}, "finger": {"plane0": 1.0}}
+    assert metrics.plain(forces) == found
+
+
+def test_a_new_figure_of_a_measurement_is_in_the_metrics():
+    @dataclass(frozen=True)
+    class More(Measure):
+        deepest: float = 0.5
+
+        @property
+        def twice(self) -> float:
+            return 2.0 * self.deepest
+
+    values = [0.0] * (len(fields(Measure)) - 1)
+    found = metrics.figures(More(*values, forces={}))
+    assert (found["deepest"], found["twice"], found["energy"]) == (0.5, 1.0, 0.0)
 
 
 def test_the_module_runs_as_a_program():
@@ -245,6 +271,17 @@ def test_progress_is_silent_without_a_terminal_or_when_quiet(stream):
     with Progress(1, quiet=stream.isatty(), stream=stream) as line:
         line.update(at(1, 0.1), found(0, 0.0))
     assert stream.getvalue() == ""
+
+
+def test_a_terminal_that_goes_away_ends_the_line_and_not_the_run():
+    class Gone(Terminal):
+        def write(self, text):
+            raise OSError(5, "Input/output error")
+
+    with Progress(2, stream=Gone()) as line:
+        line.update(at(1, 1 / 60), found(0, 0.0))
+        line.update(at(2, 2 / 60), found(0, 0.0))
+    announce("loading", stream=Gone())
 
 
 def test_clock():

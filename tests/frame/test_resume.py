@@ -9,6 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from command_line import blocks, complaint
+from disk import Full
 
 from warp_contact.command import cli, run
 from warp_contact.simulation import Simulation
@@ -135,15 +136,23 @@ def test_a_finished_run_is_continued_or_left_as_it_is(tmp_path, thrown):
         assert contents(out) == contents(whole)
 
 
-def test_a_run_from_the_start_forgets_the_checkpoint_before_it(
+def test_a_run_over_another_one_leaves_it_until_its_own_first_frame_is_whole(
     tmp_path, thrown, monkeypatch, capsys
 ):
-    command = ["run", thrown, "--frames", "1", "--quiet", "--out", str(tmp_path / "out")]
-    assert cli.main(command) == 0
-    interrupted(monkeypatch, "save", 0, command)
-    capsys.readouterr()
-    assert cli.main([*command, "--resume"]) == 2
-    assert "nothing to resume" in complaint(capsys)
+    out = tmp_path / "out"
+    command = ["run", thrown, "--frames", "1", "--quiet", "--out", str(out)]
+    assert cli.main([*command, "--frames", "2"]) == 0
+    before = contents(out)
+    assert cli.main(command) == 2
+    assert "out.usda is there already" in complaint(capsys)
+    interrupted(monkeypatch, "save", 0, [*command, "--overwrite"])
+    assert cli.main([*command, "--overwrite", "--substeps", "1", "--set", "speed=1e5"]) != 0
+    assert contents(out) == before
+    assert cli.main([*command, "--overwrite", "--set", "speed=7.0"]) == 0
+    assert contents(out) != before and problems(out) == []
+    assert len(contents(out)[1].splitlines()) == 2
+    with np.load(out / "checkpoint.npz") as checkpoint:
+        assert checkpoint["frame"] == 1
 
 
 @pytest.mark.parametrize(
@@ -167,13 +176,28 @@ def test_another_scene_does_not_resume(tmp_path, scene, thrown, other, words, ca
     assert contents(out) == before
 
 
-def test_another_start_velocity_or_lost_frames_do_not_resume(tmp_path, thrown, capsys):
+def test_another_start_velocity_does_not_resume(tmp_path, thrown, capsys):
     out = tmp_path / "out"
     command = ["run", thrown, "--frames", "2", "--out", str(out)]
     assert cli.main([*command, "--quiet"]) == 0
     assert cli.main([*command, "--resume", "--set", "speed=9.0"]) == 2
     assert "placed or moved otherwise" in complaint(capsys)
-    lines = (out / "metrics.jsonl").read_text().splitlines(keepends=True)
-    (out / "metrics.jsonl").write_text("".join(lines[:2]))
-    assert cli.main([*command, "--resume"]) == 2
-    assert "lacks frames" in complaint(capsys)
+
+
+@pytest.mark.parametrize("k", [*range(1, 60, 6), 1000])
+def test_a_run_that_finds_the_disk_full_goes_on_when_there_is_room(
+    tmp_path, thrown, k, monkeypatch
+):
+    """At several of its calls, from the first files to the last checkpoint."""
+    monkeypatch.setattr(run, "SAVE_EVERY", 0.0)
+    command = ["run", thrown, "--frames", "3", "--quiet", "--out"]
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    assert cli.main([*command, str(whole)]) == 0
+    with monkeypatch.context() as patch:
+        Full(patch, k)
+        assert (cli.main([*command, str(out)]) == 0) == (k == 1000)
+    # While the first files are moved to their place there may be none to be seen, but all to go on.
+    assert not (out / "out.usda").exists() or problems(out) == []
+    assert cli.main([*command, str(out), *(["--resume"] if out.exists() else [])]) == 0
+    assert contents(out) == contents(whole)
+    assert [path.name for path in out.rglob(".*")] == []

@@ -106,6 +106,13 @@ def test_the_check_sees_a_lost_or_torn_frame(tmp_path):
     assert any("samples" in line for line in problems(tmp_path / "run"))
 
 
+def test_the_check_sees_a_frame_in_the_place_of_another(tmp_path):
+    written(tmp_path / "run")
+    frames = tmp_path / "run" / "frames"
+    (frames / "f.000003.usdc").write_bytes((frames / "f.000001.usdc").read_bytes())
+    assert problems(tmp_path / "run") == ["f.000003.usdc is not frame 3: it has [1.0]"]
+
+
 def test_the_check_reports_what_is_no_usd_file(tmp_path):
     (tmp_path / "x.usda").write_text("nothing")
     assert len(problems(tmp_path / "x.usda")) == 1

@@ -33,10 +33,10 @@ def test_nothing_is_wrong_with_what_is_written(tmp_path):
     assert problems(tmp_path / "three" / "three.usdc") == []
 
 
-def test_the_stage_is_valid_before_and_after_each_frame(tmp_path):
+def test_the_stage_appears_with_its_first_frame_and_is_valid_after_each(tmp_path):
     sim = FakeSimulation()
     writer = UsdWriter(tmp_path, sim)
-    assert len(reader.read_bodies(reader.open_stage(tmp_path))) == 2
+    assert [p for p in tmp_path.iterdir() if not p.name.startswith(".")] == []
     for sim.frame in range(3):
         writer.write()
         stage = reader.open_stage(tmp_path)
@@ -106,9 +106,11 @@ def test_a_frame_costs_about_what_its_points_cost(tmp_path):
     assert size < 28 * n + 4096
 
 
-def test_a_second_run_replaces_the_first(tmp_path):
+def test_a_second_run_replaces_the_first_when_asked_to(tmp_path):
     written(tmp_path / "run", 6, flatten=True)
-    stage = written(tmp_path / "run", 2)
+    with pytest.raises(FileExistsError, match=r"run\.usda is there already"):
+        written(tmp_path / "run", 2)
+    stage = written(tmp_path / "run", 2, overwrite=True)
     assert stage.GetEndTimeCode() == 2
     assert len(list((tmp_path / "run" / "frames").iterdir())) == 3
     assert not (tmp_path / "run" / "run.usdc").exists()

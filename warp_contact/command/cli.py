@@ -1,18 +1,21 @@
 """The command line: ``warp-contact run | scenes | info | render | validate``.
 
-Exit codes: 0 done, 1 failed on the way, 2 wrong usage or input, 130 interrupted. An error is one
-line on stderr; ``--debug`` before the command raises it instead.
+Exit codes: 0 done, 1 failed on the way, 2 wrong usage or input, 128 + its number after a signal
+(130 interrupted, 143 terminated, 129 hung up). An error is one line on stderr; ``--debug`` before
+the command raises it instead.
 """
 
 import argparse
+import contextlib
 import math
 import os
+import signal
 import sys
 from pathlib import Path
 
 import warp as wp
 
-from warp_contact import __version__
+from warp_contact import __version__, interrupts
 from warp_contact.command import commands, run
 from warp_contact.errors import SimulationError, UsageError
 
@@ -32,12 +35,13 @@ def main(argv: list[str] | None = None) -> int:
     except SystemExit as stop:
         return int(stop.code or 0)
     try:
-        start_warp()
-        code = args.command(args)
-        sys.stdout.flush()
-        return code
-    except KeyboardInterrupt:
-        return fail("interrupted", 130)
+        with interrupts.Raised():
+            start_warp()
+            code = args.command(args)
+            sys.stdout.flush()
+            return code
+    except KeyboardInterrupt as stop:
+        return fail("interrupted", 128 + getattr(stop, "number", signal.SIGINT))
     except BrokenPipeError:  # the reader of stdout, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -51,7 +55,8 @@ def main(argv: list[str] | None = None) -> int:
 
 def fail(text: str, code: int) -> int:
     """Say in one line what went wrong."""
-    print(f"warp-contact: error: {' '.join(text.split())}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # a terminal that is gone
+        print(f"warp-contact: error: {' '.join(text.split())}", file=sys.stderr, flush=True)
     return code
 
 
@@ -93,7 +98,7 @@ def add_run(group) -> None:
     add = command.add_argument
     add("scene", metavar="SCENE", help="name of a scene, or a .py file with build()")
     add("--frames", type=count, metavar="N", help="frames to step; default: the scene's")
-    add("--out", required=True, type=Path, metavar="DIR", help="directory of the results")
+    add("--out", required=True, type=place, metavar="DIR", help="directory of the results")
     add(
         "--response",
         choices=run.RESPONSES,
@@ -115,7 +120,9 @@ def add_run(group) -> None:
         help="arguments of the scene's build(): a Python literal or else a string",
     )
     add("--sleep", action="store_true", help="leave bodies at rest alone until something comes")
-    add("--resume", action="store_true", help="go on from DIR/checkpoint.npz, up to frame N")
+    old = command.add_mutually_exclusive_group().add_argument
+    old("--resume", action="store_true", help="go on from DIR/checkpoint.npz, up to frame N")
+    old("--overwrite", action="store_true", help="replace what is in DIR, at the first frame")
     add("--quiet", action="store_true", help="no progress line and no summary")
     add("--flatten", action="store_true", help="also write everything into one .usdc")
     command.set_defaults(command=run.run)
@@ -128,7 +135,7 @@ def add_render(group) -> None:
     add("file", metavar="DIR", help="run directory or USD file")
     add("--frames", metavar="LIST", help="such as 0,30,-1 or 0:120:2; default: all")
     add("--size", type=size, default=(960, 540), metavar="WxH", help="default: 960x540")
-    add("--out", type=Path, metavar="DIR", help="default: pictures/ beside the USD file")
+    add("--out", type=place, metavar="DIR", help="default: pictures/ beside the USD file")
     add("--webp", action="store_true", help="join the pictures into an animated WebP too")
     add("--gif", action="store_true", help="join the pictures into an animated GIF too")
     add("--eye", nargs=3, type=float, metavar=("X", "Y", "Z"), help="place of the camera [m]")
@@ -138,6 +145,13 @@ def add_render(group) -> None:
     add("--device", metavar="NAME", help="cpu, cuda:0, ...; default: Warp's")
     add("--quiet", action="store_true", help="do not name the files")
     command.set_defaults(command=commands.draw)
+
+
+def place(text: str) -> Path:
+    """A path that is not empty."""
+    if not text:
+        raise argparse.ArgumentTypeError("the path is empty")
+    return Path(text)
 
 
 def count(text: str) -> int:

@@ -9,28 +9,29 @@ import importlib
 import importlib.util
 import inspect
 import json
-import math
-import os
 import time
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
-from warp_contact import checks
-from warp_contact.command.lock import RunLock
+from warp_contact import checks, interrupts
+from warp_contact.command.metrics import figures, line_of
 from warp_contact.command.scene_file import check_scene_file
 from warp_contact.command.warned import warned
 from warp_contact.errors import UsageError
+from warp_contact.files import append, replacing
 from warp_contact.progress import Progress, announce
 from warp_contact.scene.scene import Scene
 from warp_contact.simulation import Simulation
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.usd.folder import RunFolder, frame_file
+from warp_contact.usd.kept import check_frames, read_layer
 from warp_contact.usd.prims import parts
-from warp_contact.usd.reader import frame_numbers, open_stage, read_points, root_path
 from warp_contact.usd.writer import UsdWriter
 
 RESPONSES = ("contact-surface", "literal", "penalty", "predicted")
+METRICS, CHECKPOINT = "metrics.jsonl", "checkpoint.npz"
 SAVE_EVERY = 1.0  # least time between two checkpoints of a run, but for the last [s]
 
 
@@ -39,35 +40,40 @@ def run(args) -> int:
     module = load_scene(args.scene)
     scene = build_scene(module, args.scene, settings(module.build, args.settings))
     n = args.frames or getattr(module, "FRAMES", 120)
-    announce("loading the kernels (the first run compiles them)", args.quiet)
     try:
-        root = root_path(args.out)
-        sim = simulation(module, scene, args)
-    except ValueError as error:
+        folder = RunFolder(args.out, args.overwrite, args.resume, beside=(METRICS, CHECKPOINT))
+    except (ValueError, OSError) as error:
         raise UsageError(str(error)) from error
-    with RunLock(root):
-        return write_run(sim, module, root, n, args)
+    with folder:
+        announce("loading the kernels (the first run compiles them)", args.quiet)
+        try:
+            sim = simulation(module, scene, args)
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+        return write_run(sim, module, folder, n, args)
 
 
-def write_run(sim: Simulation, module, root: Path, n: int, args) -> int:
+def write_run(sim: Simulation, module, folder: RunFolder, n: int, args) -> int:
     """Step the simulation and write the run, or go on with an earlier one."""
-    saved, metrics = root.with_name("checkpoint.npz"), root.with_name("metrics.jsonl")
-    try:
-        kept = go_on(sim, root, saved, metrics) if args.resume else 0
-        view = getattr(module, "VIEW", None)
-        view = (view["eye"], view["target"]) if view else None
-        writer = UsdWriter(root, sim, flatten=args.flatten, view=view, resume=args.resume)
-    except ValueError as error:
-        raise UsageError(str(error)) from error
+    view = getattr(module, "VIEW", None)
+    view = (view["eye"], view["target"]) if view else None
+    options = {"flatten": args.flatten, "view": view, "resume": args.resume}
     if args.resume:
-        os.truncate(metrics, kept)
+        try:
+            go_on(sim, folder.root)
+            writer = UsdWriter(folder, sim, **options)
+        except (ValueError, OSError) as error:
+            remedy = "to start anew, give --overwrite instead of --resume"
+            raise UsageError(f"{error}; {remedy}") from error
+        with replacing(folder.now / METRICS) as part:
+            part.write_text("".join(writer.notes), encoding="utf-8")
     else:
-        saved.unlink(missing_ok=True)
-    with writer, metrics.open("a" if args.resume else "w", encoding="utf-8") as log:
-        take_frames(sim, n, writer, log, saved, args)
+        writer = UsdWriter(folder, sim, **options)
+    with writer:
+        take_frames(sim, n, writer, args)
     if not args.quiet:
         print(f"{writer.root}: frames {writer.start} to {writer.end}")
-        print(metrics)
+        print(folder.now / METRICS)
     return 0
 
 
@@ -84,71 +90,54 @@ def simulation(module, scene: Scene, args) -> Simulation:
     )
 
 
-def take_frames(sim: Simulation, n: int, writer: UsdWriter, log, saved: Path, args) -> None:
+def take_frames(sim: Simulation, n: int, writer: UsdWriter, args) -> None:
     """Step to frame ``n``, write each frame, and a checkpoint now and then."""
-    left = max(0, n - sim.frame)
+    folder, left = writer.folder, max(0, n - sim.frame)
     with Progress(left, args.quiet) as line:
-        if not args.resume:
-            record(sim, writer, log)
-            sim.save(saved)
+        if not args.resume:  # all of it appears with the frame
+            text = line_of(sim, sim.measure())
+            append(folder.now / METRICS, text)
+            sim.save(folder.now / CHECKPOINT)
+            writer.write(text)
         last = time.monotonic()
         for frame in sim.frames(left):
-            measured = record(sim, writer, log)
+            measured = sim.measure()
+            text = line_of(sim, measured)
+            writer.write(text)
+            append(folder.now / METRICS, text)
             line.update(sim, measured)
+            interrupts.check()
             if frame == n or time.monotonic() - last >= SAVE_EVERY:
-                sim.save(saved)
+                sim.save(folder.now / CHECKPOINT)
                 last = time.monotonic()
 
 
-def go_on(sim, root: Path, saved: Path, metrics: Path) -> int:
-    """Continue an earlier run at its checkpoint; return how much of its metrics stays [bytes].
+def go_on(sim: Simulation, root: Path) -> None:
+    """Continue an earlier run at its checkpoint.
 
     Raises:
         OSError: a file of the run cannot be read
         ValueError: there is no checkpoint, or it is of another scene or other settings, or the
-            frames before it are not all there
+            first frame is not that of this run
     """
+    saved = root.with_name(CHECKPOINT)
     if not saved.is_file():
         raise ValueError(f"nothing to resume: no file {saved}")
-    x, begun = sim.positions(), line_of(sim, sim.measure())
+    x, begun = sim.positions(), figures(sim.measure())
     sim.load(saved)
-    stage = open_stage(root)
-    lines = metrics.read_bytes().splitlines(keepends=True)[: sim.frame + 1]
-    if len(lines) <= sim.frame or sim.frame not in frame_numbers(stage):
-        raise ValueError(f"{root.parent} lacks frames before that of its checkpoint")
-    bodies = dict(zip(sim.model.labels, parts(sim.model), strict=True))
-    points, first = read_points(stage, 0), json.loads(lines[0])
-    same = list(points) == list(bodies)
-    same = same and all(np.array_equal(points[k], x[body.ids]) for k, body in bodies.items())
-    # These measures are sums on the host, the same for every device.
-    if not same or any(begun[k] != first[k] for k in ("kinetic", "momentum", "angular_momentum")):
+    wanted = {f"{part.path}/surface.points": x[part.ids] for part in parts(sim.model)}
+    first = read_layer(frame_file(root.parent, 0))
+    same = first is None or all(first.GetAttributeAtPath(name) for name in wanted)
+    if same:
+        lengths = {name: len(points) for name, points in wanted.items()}
+        (data,) = check_frames(root.parent, range(1), lengths)
+        line = json.loads(data.get("note") or "{}")
+        same = all(np.array_equal(first.QueryTimeSample(k, 0.0), v) for k, v in wanted.items())
+        # These measures are sums on the host, the same for every device.
+        sums = ("kinetic", "momentum", "angular_momentum")
+        same = same and all(line.get(name) == begun[name] for name in sums)
+    if not same:
         raise ValueError(f"{saved} is of a run with other bodies, or placed or moved otherwise")
-    return sum(map(len, lines))
-
-
-def record(sim, writer: UsdWriter, log):
-    """Write a frame and its line of metrics; return what was measured."""
-    measured = sim.measure()
-    writer.write()
-    log.write(json.dumps(line_of(sim, measured), allow_nan=False) + "\n")
-    log.flush()
-    return measured
-
-
-def line_of(sim, measured) -> dict:
-    """A frame's metrics as JSON takes them; forces as [body, body, N]."""
-    values = {name: plain(value) for name, value in vars(measured).items() if name != "forces"}
-    forces = [[a, b, plain(force)] for (a, b), force in measured.forces.items()]
-    return {"frame": sim.frame, "time": sim.time, **values, "forces": forces}
-
-
-def plain(value):
-    """A value as JSON takes it, null for a number that is not finite."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def load_scene(name: str) -> ModuleType:

@@ -2,14 +2,15 @@
 
 import hashlib
 import os
-import zipfile
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.recfunctions import repack_fields
 
 from warp_contact.data.model import Model
+from warp_contact.files import replacing
 
-FORMAT = 4
+FORMAT = 5
 
 
 def fingerprint(model: Model, *settings) -> str:
@@ -27,14 +28,8 @@ def fingerprint(model: Model, *settings) -> str:
 
 def write(path: str | os.PathLike, scene: str, values: dict[str, np.ndarray]) -> None:
     """Write ``values`` as ``.npz`` under the fingerprint ``scene``; the file appears complete."""
-    path = Path(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with part.open("wb") as file:
-            np.savez(file, scene=np.array(scene), **values)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(Path(path)) as part, part.open("wb") as file:
+        np.savez(file, scene=np.array(scene), digest=np.array(_digest(values)), **values)
 
 
 def read(path: str | os.PathLike, scene: str) -> dict[str, np.ndarray]:
@@ -42,22 +37,36 @@ def read(path: str | os.PathLike, scene: str) -> dict[str, np.ndarray]:
 
     Raises:
         OSError: it cannot be read
-        ValueError: it is no checkpoint, or one of another scene or other settings
+        ValueError: it is no checkpoint, one of another scene or other settings, or damaged
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             values = dict(file)
-    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{path} is no checkpoint") from error
+    except OSError:
+        raise
+    except Exception as error:  # what a damaged archive leads to has no common name
+        raise ValueError(f"{path} is no checkpoint, or damaged") from error
     if str(values.pop("scene", "")) != scene:
         what = "another scene, or of other settings or another version of the simulation"
         raise ValueError(f"{path} is of {what}")
+    if str(values.pop("digest", "")) != _digest(values):
+        raise ValueError(f"{path} is damaged: it is not what was written")
     return values
 
 
 def ungroup(groups: dict[str, dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
     """The values of groups in one dictionary, called ``name.something``."""
     return {f"{name}.{k}": value for name, values in groups.items() for k, value in values.items()}
+
+
+def _digest(values: dict[str, np.ndarray]) -> str:
+    """Digest of names, types, shapes and values."""
+    digest = hashlib.sha256()
+    for name, value in sorted(values.items()):
+        value = repack_fields(value)  # what lies between fields has no value
+        digest.update(repr((name, value.dtype.descr, value.shape)).encode())
+        digest.update(value.tobytes())
+    return digest.hexdigest()
 
 
 def group(values: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:

@@ -105,9 +105,9 @@ def prim_name(label: str, taken: set[str]) -> str:
 
 
 def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Layer:
-    """The layer of everything that does not change."""
-    model, x = sim.model, np.asarray(sim.positions(), dtype=np.float32)
-    rest = np.concatenate([body.x for body in sim.scene.bodies]).astype(np.float32)
+    """The layer of everything that does not change; the same at any time of a run."""
+    model = sim.model
+    x = np.concatenate([body.x for body in sim.scene.bodies]).astype(np.float32)
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
     stage.SetTimeCodesPerSecond(sim.fps)
@@ -125,7 +125,7 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
         note(xform, "fixed", Sdf.ValueTypeNames.Bool, part.fixed)
         add_surface(stage, part, x, look)
         if tets:
-            add_tets(stage, part, b, model, rest, physics)
+            add_tets(stage, part, b, model, x, physics)
     taken = {Sdf.Path(part.path).name for part in parts} | {"Looks", "view"}
     for n, h in zip(model.plane_n.numpy(), model.plane_h.numpy(), strict=True):
         add_plane(stage, f"/World/{prim_name('ground', taken)}", n, float(h), x, look)

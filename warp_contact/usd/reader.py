@@ -1,6 +1,8 @@
 """Reads the stages that a ``UsdWriter`` writes."""
 
+import os
 import re
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,6 +12,7 @@ import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
 from warp_contact import checks
+from warp_contact.files import HIDDEN
 
 FRAMES = 1_000_000  # numbers of frames are below: they have six digits
 
@@ -25,13 +28,31 @@ class Body:
 
 
 def root_path(path) -> Path:
-    """The root layer that ``path``, a directory or a ``.usda`` file, stands for."""
+    """The root layer that ``path``, a directory or a ``.usda`` file, stands for.
+
+    Raises:
+        ValueError: it is empty, of another kind, or has a name that USD cannot open
+    """
     path = checks.path(path, "path").resolve()
+    reason = unusable(path)
+    if reason:
+        raise ValueError(f"{str(path)!r}: {reason}")
     if path.suffix == ".usda":
         return path
     if path.suffix.startswith(".usd") or path.is_file():
         raise ValueError(f"{path.name}: give a directory or the path of a .usda file")
     return path / f"{path.name or 'simulation'}.usda"
+
+
+def unusable(path: Path) -> str | None:
+    """What USD does not take in the name of a file or its folders, if anything."""
+    name = str(path)
+    if any(unicodedata.category(c) in ("Cc", "Cs") for c in name):
+        return "USD opens no file with a control character, or what is no UTF-8, in its name"
+    for part in ("\\", ":SDF_FORMAT_ARGS:"):
+        if part in name and os.sep != part:
+            return f"USD opens no file with {part} in its name"
+    return None
 
 
 def open_stage(path) -> Usd.Stage:
@@ -41,6 +62,9 @@ def open_stage(path) -> Usd.Stage:
         path = root_path(path) if root_path(path).exists() else only_root(path)
     if not path.exists():
         raise FileNotFoundError(f"no such file: {path}")
+    reason = unusable(path.resolve())
+    if reason:
+        raise OSError(f"{str(path)!r}: {reason}")
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
@@ -51,10 +75,15 @@ def open_stage(path) -> Usd.Stage:
 
 def only_root(directory: Path) -> Path:
     """The one root layer in a directory."""
-    roots = sorted(directory.glob("*.usda"))
+    roots = roots_in(directory)
     if len(roots) != 1:
         raise FileNotFoundError(f"{directory} holds {len(roots) or 'no'} .usda files, not one")
     return roots[0]
+
+
+def roots_in(directory: Path) -> list[Path]:
+    """All ``.usda`` files of a directory that are finished."""
+    return sorted(p for p in directory.glob("*.usda") if not p.name.startswith(HIDDEN))
 
 
 def frame_numbers(stage: Usd.Stage) -> range:

@@ -5,28 +5,40 @@
     <dir>/manifest.usdc         which attributes the frames carry: once
     <dir>/frames/f.000012.usdc  what changes: one file a frame
 
-Each file is written under another name and then renamed, a frame before the root that counts it.
-So at any moment the root names finished frames only, and all of them.
+Each file is written under another name, put on the disk and renamed, a frame before the root that
+counts it. So at any moment the root names finished frames only, and all of them. The files appear
+together with the first frame, or take the place of an earlier run together with the second: the
+first shows the start, and a run may fail before it gets any further.
 
 Each surface carries ``primvars:contact:pressure`` [Pa], ``penetration`` [m] and ``partner``: the
 index of the other body, n_body + p for half-space p, -1 for none. Pressure and penetration are
 rounded to a thousandth of their largest value on the body, which packs them to half the size.
 """
 
-import os
 from pathlib import Path
 
 import numpy as np
 from pxr import Sdf, UsdGeom, Vt
 
+from warp_contact.files import replacing
+from warp_contact.usd.folder import TOPOLOGY, RunFolder, frame_file, frame_files
+from warp_contact.usd.kept import check_frames, check_layers, first_frame
 from warp_contact.usd.prims import check_options, heated, parts, topology
-from warp_contact.usd.reader import frame_numbers, open_stage, read_bodies, root_path
+from warp_contact.usd.reader import open_stage
 
 LEVELS = 1000  # distinct values of a scalar in a frame: the crate format packs up to about 1024
 
 
 class UsdWriter:
-    """Writes one frame of ``sim`` at each ``write()``; a context manager."""
+    """Writes one frame of ``sim`` at each ``write()``; a context manager.
+
+    It owns the folder until it is closed: another writer there is refused, in any process.
+
+    Attributes:
+        start: the first frame written, None before it
+        end: the last one
+        notes: those of the frames that were there when it was resumed
+    """
 
     def __init__(
         self,
@@ -39,12 +51,14 @@ class UsdWriter:
         animate_tets: bool = False,
         view: tuple | None = None,
         pressure_scale: float | None = None,
+        overwrite: bool = False,
         resume: bool = False,
     ):
-        """Start a file; an earlier one at the same place is removed, or resumed.
+        """Start a file, or resume an earlier one.
 
         Args:
-            path: a directory, whose name the root layer takes, or the ``.usda`` root layer itself
+            path: a directory, whose name the root layer takes, or the ``.usda`` root layer itself;
+                or a ``RunFolder``, which is closed with the writer
             sim: the simulation; its model, positions and contact fields are what is written
             velocities: write the surface velocities [m/s] too
             tets: write each body's TetMesh, purpose guide
@@ -53,34 +67,43 @@ class UsdWriter:
             view: eye and target [m] of a camera to write
             pressure_scale: pressure [Pa] drawn as fully hot; None takes twice the hydrostatic
                 pressure over the scene's size, or without gravity the highest pressure so far
+            overwrite: replace what is there, when a second frame is written or the writer closed
             resume: continue after frame ``sim.frame`` of the earlier file, written with the
                 same arguments; the frames after it are removed
 
         Raises:
-            OSError: a file cannot be written, or there is none to resume
-            ValueError: the path is that of another file, or the file to resume has no such
-                frame or other bodies
+            OSError: something is there, or another writer at work; it cannot be written to
+            ValueError: the path cannot be that of a root layer; what is to be resumed is damaged
         """
         check_options(sim, view, pressure_scale, (velocities, tets, flatten, animate_tets, resume))
-        self.root, self.sim = root_path(path), sim
-        self.velocities, self.flatten = velocities, flatten
+        taken = isinstance(path, RunFolder)
+        self.folder = path if taken else RunFolder(path, overwrite, resume)
+        self.sim, self.velocities, self.flatten = sim, velocities, flatten
         self.animate_tets = animate_tets and tets
-        self.start, self.end, self.parts = None, None, parts(sim.model)
+        self.start, self.end, self.notes = None, None, []
+        self.parts = parts(sim.model)
         self.base = np.concatenate([np.tile(p.color, (p.n_vert, 1)) for p in self.parts])
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
         self.grows, self.layer = self.scale == 0.0, self._declare()
-        if resume:
-            self._reopen()
-        else:
-            self._begin(topology(self.parts, sim, tets, view))
+        self._begin(topology(self.parts, sim, tets, view), resume)
 
-    def _begin(self, prims: Sdf.Layer) -> None:
-        """Remove an earlier file at the same place, and write what does not change."""
-        self.root.unlink(missing_ok=True)
-        self._remove()
-        export(prims, self.root.parent / "topology.usdc")
-        export(self.layer, self.root.parent / "manifest.usdc")
-        self._write_root()
+    def _begin(self, prims: Sdf.Layer, resume: bool) -> None:
+        """Write what does not change."""
+        try:
+            if resume:
+                self._check()
+            export(prims, self.folder.now / TOPOLOGY)
+            export(self.layer, self.folder.now / "manifest.usdc")
+            if resume:
+                self._cut()
+        except BaseException:
+            self.folder.close()
+            raise
+
+    @property
+    def root(self) -> Path:
+        """The root layer."""
+        return self.folder.root
 
     def __enter__(self):
         """Return the writer."""
@@ -90,52 +113,53 @@ class UsdWriter:
         """Close; after an error what was written stays and nothing is flattened."""
         if kind is None:
             self.close()
+        self.folder.close()
 
-    def write(self) -> None:
-        """Write the state of the simulation as frame ``sim.frame``."""
+    def write(self, note: str = "") -> None:
+        """Write the state of the simulation as frame ``sim.frame``, and ``note`` in its file."""
         frame = self.sim.frame
+        if not self.folder.is_open:
+            raise ValueError(f"{self.root} is closed: no frame can be written any more")
         if self.end is not None and frame != self.end + 1:
             raise ValueError(f"frame {frame} cannot follow frame {self.end}")
         for path, value in self._values():
             if self.end is not None:
                 self.layer.EraseTimeSample(path, self.end)
             self.layer.SetTimeSample(path, frame, value)
-        self.layer.customLayerData = {"pressureScale": self.scale}
-        export(self.layer, self._frame(frame))
-        self.start = frame if self.start is None else self.start
-        self.end = frame
-        self._write_root()
+        self.layer.customLayerData = {"pressureScale": self.scale, "note": note}
+        export(self.layer, frame_file(self.folder.now, frame))
+        start = frame if self.start is None else self.start
+        self._write_root(start, frame)
+        if self.end is not None or not self.folder.replaces:
+            self.folder.publish()
+        self.start, self.end = start, frame
 
     def close(self) -> None:
-        """Flatten, if asked to."""
-        if self.flatten and self.end is not None:
-            export(open_stage(self.root).Flatten(), self.root.with_suffix(".usdc"))
+        """Flatten, if asked to, and let others have the folder."""
+        if self.folder.is_open and self.end is not None:
+            self.folder.publish()
+            if self.flatten:
+                export(open_stage(self.root).Flatten(), self.root.with_suffix(".usdc"))
+        self.folder.close()
 
-    def _frame(self, frame: int) -> Path:
-        """The file of a frame."""
-        return self.root.parent / "frames" / f"f.{frame:06d}.usdc"
+    def _check(self) -> None:
+        """See that the earlier file, up to the frame of the simulation, is what it should be."""
+        self.start, self.end = first_frame(self.root), self.sim.frame
+        check_layers(self.root, self.layer, list(self.sim.model.labels))
+        lengths = {path: len(value) for path, value in self._values()}
+        kept = check_frames(self.root.parent, range(self.start, self.end + 1), lengths)
+        if not kept:
+            raise ValueError(f"{self.root} begins at frame {self.start}, after {self.end}")
+        self.scale = kept[-1].get("pressureScale", self.scale)
+        self.notes = [data.get("note", "") for data in kept]
 
-    def _reopen(self) -> None:
+    def _cut(self) -> None:
         """Make the earlier file end at the frame of the simulation."""
-        stage, frame = open_stage(self.root), self.sim.frame
-        if [body.label for body in read_bodies(stage)] != list(self.sim.model.labels):
-            raise ValueError(f"{self.root} has other bodies")
-        if frame not in frame_numbers(stage) or not self._frame(frame).is_file():
-            raise ValueError(f"{self.root} has no frame {frame} to go on from")
-        last = Sdf.Layer.OpenAsAnonymous(str(self._frame(frame)))
-        self.scale = last.customLayerData.get("pressureScale", self.scale)
-        self.start, self.end = frame_numbers(stage)[0], frame
-        self._write_root()
-        self._remove(after=frame)
-
-    def _remove(self, after: int = -1) -> None:
-        """Remove the frames after one, unfinished files and the flattened file."""
-        frames = self._frame(0).parent
-        frames.mkdir(parents=True, exist_ok=True)
-        kept = {self._frame(frame) for frame in range(after + 1)}
-        for old in {*frames.glob("f.*.usdc"), *frames.glob(".tmp.*")} - kept:
-            old.unlink(missing_ok=True)
+        self._write_root(self.start, self.end)
         self.root.with_suffix(".usdc").unlink(missing_ok=True)
+        for path in frame_files(self.root.parent):
+            if path > frame_file(self.root.parent, self.end):
+                path.unlink()
 
     def _values(self):
         """The attributes of this frame: path and value."""
@@ -187,38 +211,34 @@ class UsdWriter:
                     Sdf.AttributeSpec(spec, name, kind)
         return layer
 
-    def _write_root(self) -> None:
-        """Make the root layer name the frames written so far."""
+    def _write_root(self, start: int, end: int) -> None:
+        """Make the root layer name the frames."""
         layer = Sdf.Layer.CreateAnonymous(".usda")
         layer.subLayerPaths.append("./topology.usdc")
         layer.defaultPrim = "World"
         layer.timeCodesPerSecond = layer.framesPerSecond = self.sim.fps
-        layer.startTimeCode = self.sim.frame if self.start is None else self.start
-        layer.endTimeCode = layer.startTimeCode if self.end is None else self.end
+        layer.startTimeCode, layer.endTimeCode = start, end
         for key, value in ("upAxis", "Z"), ("metersPerUnit", 1.0), ("kilogramsPerUnit", 1.0):
             layer.pseudoRoot.SetInfo(key, value)
         world = Sdf.CreatePrimInLayer(layer, "/World")
-        if self.end is not None:
-            clips = {
-                "templateAssetPath": "./frames/f.######.usdc",
-                "templateStartTime": float(self.start),
-                "templateEndTime": float(self.end),
-                "templateStride": 1.0,
-                "manifestAssetPath": Sdf.AssetPath("./manifest.usdc"),
-                "primPath": "/World",
-            }
-            world.SetInfo("clips", {"default": clips})
-        temporary = self.root.with_name(f".{self.root.name}.tmp")
-        temporary.write_text(layer.ExportToString(), encoding="utf-8")
-        os.replace(temporary, self.root)
+        clips = {
+            "templateAssetPath": "./frames/f.######.usdc",
+            "templateStartTime": float(start),
+            "templateEndTime": float(end),
+            "templateStride": 1.0,
+            "manifestAssetPath": Sdf.AssetPath("./manifest.usdc"),
+            "primPath": "/World",
+        }
+        world.SetInfo("clips", {"default": clips})
+        with replacing(self.folder.now / self.root.name) as part:
+            part.write_text(layer.ExportToString(), encoding="utf-8")
 
 
 def export(layer: Sdf.Layer, path: Path) -> None:
     """Write a layer so that ``path`` is either absent, old or complete."""
-    temporary = path.with_name(f".tmp.{path.name}")
-    if not layer.Export(str(temporary)):
-        raise OSError(f"cannot write {path}")
-    os.replace(temporary, path)
+    with replacing(path) as part:
+        if not layer.Export(str(part)):
+            raise OSError(f"cannot write {path}")
 
 
 def rounded(value: np.ndarray) -> np.ndarray:

@@ -64,7 +64,6 @@ def test_without_matplotlib_the_map_says_so(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "map").exists()
 
 
-@pytest.mark.slow
 def test_every_mass_and_stiffness_ratio_of_a_coarse_map_is_fine(monkeypatch):
     monkeypatch.setattr(sweeps, "CELLS", 5)
     s = sweeps.SWEEPS["ratio"]

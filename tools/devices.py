@@ -43,8 +43,7 @@ def main() -> int:
     """Print a figure for each scene; 1 where one is too far from the CPU's."""
     parser = command_line(__doc__)
     parser.add_argument("device", nargs="?", help="as Warp names it, or its default")
-    args = parser.parse_args()
-    device = str(wp.get_device(args.device))
+    device = str(wp.get_device(parser.parse_args().device))
     print(machine.line(device), "", report.FIGURES.head(), sep="\n")
     found = {name: positions(name, device) for name in scenes.names()}
     round_each_operation()

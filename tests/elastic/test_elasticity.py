@@ -195,6 +195,23 @@ def test_a_degenerate_tet_has_finite_forces(kind, shape, block, forces_of, at_ve
     assert np.isfinite(at_vertices(forces.apply_stiffness, model, x, dx)).all()
 
 
+@pytest.mark.parametrize("shape", [[1, 1, -1], [-1, -1, -1], [-1, 2, 2], [1, 0, 0], [1, 1, 0]])
+def test_a_mirrored_tet_is_pushed_towards_a_nearest_rotation(shape, build_model, forces_of, rng):
+    """Of which there are many there: the force is that of one of them, not of something else."""
+    x = np.array([[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.0, 1.0, 0.2], [0.3, 0.0, 1.0]])
+    model = build_model((x, np.array([[0, 1, 2, 3]]), Corotated(E, 0.0, RHO)))
+    mu = E / 2.0  # without a Poisson effect: P = 2 mu (F - R)
+    f = turn(rng) @ np.diag(shape).astype(float) @ turn(rng)
+    at_corners = -forces_of(model, x @ f.T)[1:].T  # V P Dm^-T
+    p = at_corners @ (x[1:] - x[0]) / model.volume.numpy()[0]
+    r = f - p / (2.0 * mu)
+    # Roundings of F, of the singular vectors and of the edges.
+    np.testing.assert_allclose(r @ r.T, np.eye(3), atol=1e-5)
+    assert np.linalg.det(r) == pytest.approx(1.0, abs=1e-5)
+    # No rotation is nearer: the trace of R^T F is that of NumPy's polar decomposition.
+    assert (r * f).sum() == pytest.approx((polar(f) * f).sum(), abs=1e-5)
+
+
 def test_tets_outside_the_mask_keep_their_forces(block):
     model = block[1](NeoHookean(E, NU, RHO))
     f_tet = wp.full(4 * model.n_tet, wp.vec3(1.0, 2.0, 3.0))

@@ -108,6 +108,33 @@ def test_what_does_not_fit_is_counted(rng, stages, turned, name):
         assert not work.overflow.all.numpy().any()
 
 
+@pytest.mark.parametrize("name", ["contacts", *LISTS])
+def test_what_fits_exactly_fits(rng, stages, find_contacts, turned, name):
+    scene = crowd(rng, turned)
+    room = Capacity(4096, 64, 4096, 65536, 4096, 65536, 65536)
+    model, state, work = stages(scene, room)
+    expected = find_contacts(model, work, state.x, edges=True)
+    b = work.broad_phase
+    counts = {  # of the near triangles no list is longer than their last end
+        "contacts": work.contacts.n,
+        "verts": b.verts.n,
+        "tets": b.verts.item_start[-1:],
+        "edges": b.edges.n,
+        "tris": b.edges.item_start[-1:],
+    }
+    near = int(b.near.part.numpy()["tris"].max())
+    used = int(counts[name].numpy()[0]) if name in counts else near
+    model, state, work = stages(scene, replace(room, **{name: used}))
+    found = find_contacts(model, work, state.x, edges=True)  # it asks whether anything did not fit
+    assert found.n == expected.n > 0
+    np.testing.assert_array_equal(found.vert, expected.vert)
+    model, state, work = stages(scene, replace(room, **{name: used - 1}))
+    with pytest.raises(AssertionError):
+        find_contacts(model, work, state.x, edges=True)
+    needed = dict(zip([f.name for f in fields(Capacity)], work.overflow.all.numpy(), strict=True))
+    assert needed[name] == used
+
+
 def test_a_simulation_grows_its_buffers_and_loses_nothing(rng, turned):
     scene = crowd(rng, turned)
     tiny = Simulation(scene, fps=1000)

@@ -5,11 +5,13 @@ import pytest
 
 from warp_contact import (
     ContactSurface,
+    Corotated,
     NeoHookean,
     Penalty,
     PredictedForce,
     Scene,
     Simulation,
+    TetMesh,
     box,
     sphere,
 )
@@ -87,3 +89,60 @@ def test_a_checkpoint_of_something_else_is_refused(rng, tmp_path):
         sim.load(tmp_path / "text")
     with pytest.raises(FileNotFoundError):
         sim.load(tmp_path / "missing")
+
+
+def one(mesh=None, fixed=None, world=0, plane=(0.0, 0.0, 1.0), offset=-1.0, material=RUBBER, **of):
+    """A block above a plane, and what may be different about it."""
+    scene = Scene(**of)
+    scene.add_plane(plane, offset)
+    scene.add_body(mesh or box(0.1, 2), material, fixed=fixed)
+    scene.add_body(box(0.1, 1), RUBBER, (1.0, 0.0, 0.0), world=world)
+    return Simulation(scene)
+
+
+PRESSED = TetMesh(box(0.1, 2).vertices * [1.25, 0.8, 1.0], box(0.1, 2).tets)  # of the same masses
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"gravity": (0.0, 0.0, -9.8)},
+        {"friction": 0.31},
+        {"plane": (0.0, 0.1, 1.0)},
+        {"offset": -1.1},
+        {"fixed": [0]},
+        {"world": 1},
+        {"mesh": PRESSED},
+        {"material": NeoHookean(3e4, 0.31, 1000.0, 2e-3)},
+        {"material": NeoHookean(3e4, 0.3, 1001.0, 2e-3)},
+        {"material": NeoHookean(3e4, 0.3, 1000.0, 3e-3)},
+        {"material": Corotated(3e4, 0.3, 1000.0, 2e-3)},
+    ],
+    ids=str,
+)
+def test_a_checkpoint_of_a_scene_that_differs_in_one_thing_is_refused(tmp_path, other):
+    one().save(tmp_path / "run.npz")
+    one().load(tmp_path / "run.npz")
+    with pytest.raises(ValueError, match="of another scene"):
+        one(**other).load(tmp_path / "run.npz")
+
+
+def test_a_checkpoint_that_cannot_be_finished_leaves_the_one_before(tmp_path, monkeypatch):
+    sim, path = one(), tmp_path / "run.npz"
+    sim.save(path)
+    before = path.read_bytes()
+    sim.step_frame()
+
+    def full(file, **arrays) -> None:
+        file.write(b"half of it")
+        raise OSError("no space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(np, "savez", full)
+        with pytest.raises(OSError, match="no space left"):
+            sim.save(path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+    other = one()
+    other.load(path)
+    assert other.frame == 0

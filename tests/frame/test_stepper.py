@@ -166,6 +166,32 @@ def test_buffers_outgrown_within_a_frame_end_it_at_once(looks, monkeypatch):
     np.testing.assert_array_equal(sim.positions(), calm.positions())
 
 
+@pytest.mark.parametrize("damping", [3e-4, 1e-3])
+def test_a_block_that_vibrates_loses_its_energy_at_the_rate_of_its_damping(damping):
+    scene, mesh = Scene(gravity=(0.0, 0.0, 0.0)), box(0.1, 3)
+    scene.add_body(mesh, NeoHookean(1e5, 0.0, 1000.0, damping))
+    sim = Simulation(scene, fps=500)
+    sim.set_positions(0, mesh.vertices * [1.02, 1.0, 1.0])
+    energy = [sim.measure().energy for _ in sim.frames(25)]
+    # The first mode of a bar at 10 m/s of sound, of which the others have gone after five frames.
+    rate = damping * (np.pi * 10.0 / 0.1) ** 2
+    t = np.arange(25) / sim.fps
+    found = -np.polyfit(t[5:], np.log(energy[5:]), 1)[0]
+    assert found == pytest.approx(rate, rel=0.15)  # three cells, and a step of a tenth of the time
+
+
+def test_damping_that_grows_within_a_frame_does_not_outrun_its_stages():
+    """A block is drawn to four lengths: its largest rate is then some 16 times as high."""
+    sim, top = held(NeoHookean(1e4, 0.3, 1000.0, 0.05), 10.0)
+    sim.set_velocity(0, (0.0, 0.0, 3.0), top)
+    before = sim._stepper.spectrum.damping_rate(sim.state.x)
+    sim.step_frame()
+    now = sim.measure()
+    assert sim._stepper.spectrum.damping_rate(sim.state.x) > 8.0 * before
+    # It follows what draws it, at most as fast, and no tet turns over.
+    assert np.abs(sim.velocities()).max() < 1.01 * 3.0 and now.volume_ratio > 0.5
+
+
 def stack() -> Scene:
     """Blocks that fall onto each other, so that a frame has many steps."""
     scene = Scene()

@@ -10,6 +10,7 @@ import warp as wp
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, TetMesh, box
 from warp_contact.command.run import line_of
 from warp_contact.kernels.output import tunnelling
+from warp_contact.scene.scene import rotation_matrix
 
 SOFT = NeoHookean(1e5, 0.3, 1000.0)
 PLATE = 2.0, 2.0, 0.1  # [m]
@@ -89,6 +90,32 @@ def test_what_moves_alike_does_not_pass(turned, rng):
         a, b = affine(rng)
         place(sim, start @ a.T + b)
     assert sim.measure().tunnelled == 0
+
+
+@pytest.mark.parametrize("looks", [1, 6])
+def test_a_point_that_enters_again_within_a_look_is_inside(rng, turned, looks):
+    """Through one prong of a body into the next: it has passed once, and is yet to pass again."""
+    rotate = rotation_matrix(turn := turned())
+    block = box((3.0, 1.0, 0.6), (3, 1, 3))
+    middle = block.vertices[block.tets].mean(axis=1)
+    kept = block.tets[(np.abs(middle[:, 2]) > 0.1) | (middle[:, 0] > 0.5)]
+    used, tets = np.unique(kept, return_inverse=True)
+    fork = TetMesh(block.vertices[used], tets.reshape(-1, 4))  # prongs above and below |z| = 0.1
+    tip = TetMesh([[0, 0, 0], [0.1, 0, 2.0], [-0.1, 0.1, 2.0], [-0.1, -0.1, 2.0]], [[0, 1, 2, 3]])
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    scene.add_body(fork, SOFT, rotation=turn, label="fork")
+    height = rng.uniform(0.4, 0.5)
+    place = (rng.uniform(-1.2, -0.3), rng.uniform(-0.3, 0.3), height)
+    scene.add_body(tip, SOFT, rotate @ place, turn, label="tip")
+    sim = Simulation(scene)
+    sim.measure()
+    passed = []
+    for way in (height + 0.2, 0.4):  # into the middle of the lower prong, and out of it
+        for _ in range(looks):
+            move(sim, -way / looks * rotate[:, 2])
+        passed.append(sim.measure().tunnelled)
+    # The vertex of the tip; the middles of its edges are still above.
+    assert passed == [1, 2]
 
 
 def test_in_and_out_by_the_same_face_is_no_passing(turned, rng):
@@ -198,13 +225,18 @@ def test_crossing_times_are_the_roots_of_the_cubic_within_the_triangle(rng):
 
 
 def roots(u, v, w, margin: float) -> list[float]:
-    """When a point crosses a triangle, by NumPy; by ``margin`` within it and within the time."""
+    """When a point crosses a triangle, by NumPy; by ``margin`` within it and within the time.
+
+    Where it only touches the plane, two crossings a ``margin`` apart may also be none.
+    """
     s = np.linspace(0.0, 1.0, 4)
     at = [(np.outer(1.0 - s, e[0]) + np.outer(s, e[1])) for e in (u, v, w)]
     f = np.einsum("ki,ki->k", at[0], np.cross(at[1], at[2]))
     kept = []
-    for root in np.roots(np.polyfit(s, f, 3)):
-        if abs(root.imag) < 1e-9 and margin < root.real < 1.0 - margin:
+    found = np.roots(np.polyfit(s, f, 3))
+    for k, root in enumerate(found):
+        alone = np.abs(np.delete(found, k) - root).min() > margin
+        if alone and abs(root.imag) < 1e-9 and margin < root.real < 1.0 - margin:
             p, b, c = ((1.0 - root.real) * e[0] + root.real * e[1] for e in (u, v, w))
             weights = np.linalg.lstsq(np.stack([b, c], axis=1), p, rcond=None)[0]
             if min(*weights, 1.0 - weights.sum()) > margin:
@@ -215,56 +247,9 @@ def roots(u, v, w, margin: float) -> list[float]:
 def test_a_line_of_metrics_tells_what_went_through(rng):
     sim = over_a_plate()
     move(sim, (*rng.uniform(-0.2, 0.2, 2), -0.9))
-    line = json.loads(json.dumps(line_of(sim, sim.measure()), allow_nan=False))
+    line = json.loads(line_of(sim, sim.measure()))
     assert line["tunnelled"] > 0 and line["tunnelled_pair"] == ["block", "plate"]
     assert line["inverted"] == line["unheld"] == 0
-
-
-def test_tets_turned_inside_out_are_counted(rng):
-    scene = Scene(gravity=(0.0, 0.0, 0.0))
-    mesh = box(1.0, 3)
-    scene.add_body(mesh, SOFT)
-    sim = Simulation(scene)
-    assert sim.measure().inverted == 0
-    x = sim.positions() + rng.normal(0.0, 0.2, (len(mesh.vertices), 3))
-    place(sim, x)
-    corner = np.moveaxis(sim.positions().astype(float)[mesh.tets], 1, 0)
-    volume = np.linalg.det(np.stack([c - corner[0] for c in corner[1:]], axis=1))
-    now = sim.measure()
-    assert now.inverted == int((volume <= 0.0).sum()) > 0
-    assert (now.volume_ratio <= 0.0) == (now.inverted > 0)
-
-
-def one_over_another(way) -> Simulation:
-    """A block of 16 vertices a face centred over one of 9, 0.05 m above it but for ``way``."""
-    scene = Scene(gravity=(0.0, 0.0, 0.0))
-    scene.add_body(box(1.0, 2), SOFT)
-    scene.add_body(box(0.5, 3), SOFT, np.add((0.0, 0.0, 0.8), way))
-    return Simulation(scene)
-
-
-def test_a_vertex_in_another_body_without_a_contact_is_unheld(rng):
-    sim = one_over_another((0.0, 0.0, 0.0))
-    sim.step_frame()
-    assert sim.measure().unheld == 0
-    move(sim, (*rng.uniform(-0.05, 0.05, 2), -0.05 - rng.uniform(0.02, 0.1)))
-    # The lower face of the upper body, and the middle of the upper face of the lower one.
-    assert sim.measure().unheld == 16 + 1
-
-
-def test_a_step_holds_what_overlaps_from_the_start(rng):
-    sim = one_over_another((*rng.uniform(-0.05, 0.05, 2), -0.05 - rng.uniform(0.02, 0.1)))
-    assert sim.measure().overlap > 0.0
-    sim.step_frame()
-    assert sim.measure().unheld == 0
-
-
-def test_nothing_is_unheld_before_the_first_step():
-    scene = Scene(gravity=(0.0, 0.0, 0.0))
-    for z in (0.0, 0.7):
-        scene.add_body(box(1.0, 2), SOFT, (0.0, 0.01, z))
-    now = Simulation(scene).measure()
-    assert now.overlap > 0.0 and now.unheld == 0
 
 
 @pytest.mark.parametrize("speed", [5.0, 16.0])

@@ -67,3 +67,13 @@ def test_fixed_bodies_in_one_place_are_not():
         scene.add_body(box(EDGE, 2), RUBBER, fixed=True)
     scene.add_body(box(EDGE, 1), RUBBER, (1.0, 0.0, 0.0))
     Simulation(scene)
+
+
+@pytest.mark.parametrize("held", [[True, False], [False, True], [True, np.arange(26)]])
+def test_a_fixed_and_a_free_body_in_one_place_are_refused(held):
+    """Also where only a part of one is free."""
+    scene = Scene()
+    for fixed in held:
+        scene.add_body(box(EDGE, 2), RUBBER, fixed=None if fixed is False else fixed)
+    with pytest.raises(ValueError, match="are in exactly the same place"):
+        Simulation(scene)

@@ -175,7 +175,6 @@ def test_the_bowl_repeats_for_a_seed_and_thins_out_by_a_fraction():
     assert not np.array_equal(one.bodies[1].x, bowl.build(fraction=0.1, seed=6).bodies[1].x)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", scenes.names())
 def test_a_scene_runs_without_overlap_and_without_inverting_a_tet(name):
     scene = bowl.build(fraction=0.1) if name == "bowl" else scenes.load(name).build()

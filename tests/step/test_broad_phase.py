@@ -8,7 +8,7 @@ from warp_contact import NeoHookean, Scene, Simulation, box
 from warp_contact.kernels.broad_phase import hashing
 from warp_contact.kernels.broad_phase import near as near_kernels
 from warp_contact.kernels.broad_phase import pairs as pair_kernels
-from warp_contact.step import broad_phase
+from warp_contact.step import broad_phase, narrow_phase
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 
@@ -46,6 +46,94 @@ def test_near_bodies_have_boxes_that_meet_and_none_that_touches_is_missed(
     assert not (near & ~meet).any() and (near == near.T).all()
     sure, _ = brute_force(scene, state.x.numpy().astype(float))
     assert all(near[i // 8, body] for i, body in sure) and near[0, 19]
+
+
+def listed(pairs) -> set[tuple[int, int]]:
+    """The owners of a list of pairs, and their bodies."""
+    return set(map(tuple, pairs.list.pair.numpy()[: pairs.n.numpy()[0]].tolist()))
+
+
+def crossed(model, x, bodies) -> set[tuple[int, int]]:
+    """Surface edges of some bodies, and the bodies whose triangles they cross for sure."""
+    tris, edges, owner = model.tris.numpy(), model.edges.numpy(), model.tri_body.numpy()
+    a, b, c = np.moveaxis(x[tris], 1, 0)
+    p, q = x[edges[:, 0]], x[edges[:, 1]]
+    own = model.vert_body.numpy()[edges[:, 0]]
+    found = set()
+    for e in np.flatnonzero(np.isin(own, bodies)):
+        others = owner != own[e]
+        sides = np.stack([np.broadcast_to(q[e] - p[e], a.shape), a - b, a - c], axis=2)
+        others &= np.abs(np.linalg.det(sides)) > 1e-9  # in the plane: no crossing that is sure
+        tvw = np.linalg.solve(sides[others], (a - p[e])[others, :, None])[:, :, 0]
+        inside = np.column_stack([tvw, 1.0 - tvw[:, 0], 1.0 - tvw[:, 1] - tvw[:, 2]]).min(axis=1)
+        found |= {
+            (int(e), int(body)) for body in owner[others][inside > 1e-3]
+        }  # rounding of float32
+    return found
+
+
+def test_pairs_include_all_that_can_touch_before_a_skin_is_used_up(
+    rng, stages, turned, brute_force
+):
+    """Wherever the vertices are by then, above all where bodies have come together."""
+    scene, dt = Scene(gravity=(0.0, 0.0, 0.0)), 1e-2
+    scene.add_plane((0.0, 0.0, 1.0), -0.4)
+    for k in range(8):
+        place = (np.array([k & 1, k >> 1 & 1, k >> 2]) - 0.5) * rng.uniform(0.5, 0.8)
+        v = rng.uniform(-3.0, 3.0, 3)
+        scene.add_body(box(0.5, 2), RUBBER, place, turned() if k % 2 else (0, 0, 0, 1), v)
+    model, state, work = stages(scene, dt=dt)
+    x0, own = state.x.numpy().astype(float), model.vert_body.numpy()
+    broad_phase.refresh(model, state.x, wp.array(x0 + dt * state.v.numpy(), dtype=wp.vec3), work)
+    b = work.broad_phase
+    skin = 0.999 * b.skin.numpy()  # rounding
+    verts, edges = listed(b.verts), listed(b.edges)
+    middle = np.array([x0[own == m].mean(axis=0) for m in range(8)])
+    touching = 0
+    for m in range(8):
+        for other in range(m):
+            way = middle[other] - middle[m]
+            way /= np.linalg.norm(way)
+            x = x0 + rng.uniform(-0.3, 0.3, x0.shape) * skin[own, None]
+            x[own == m] = x0[own == m] + skin[m] * way
+            x[own == other] = x0[own == other] - skin[other] * way
+            sure, _ = brute_force(scene, x)
+            across = crossed(model, x, (m, other))
+            assert sure <= verts and across <= edges
+            touching += len(sure) + len(across)
+    assert touching > 0
+    down = x0[:, 2] - skin[own]
+    below = np.flatnonzero((down < -0.4) & (model.on_surface.numpy() == 1))
+    assert len(below) > 0 and {(int(i), model.n_body) for i in below} <= verts
+
+
+def test_pairs_hold_where_a_fast_body_pushes_one_at_rest(stages):
+    """Flush with it, and towards a third, which it meets before the step ends."""
+    scene, dt, way = Scene(), 1e-3, 0.02
+    for x, v in ((-0.1, way / dt), (0.0, 0.0), (0.1 + 0.9 * way, 0.0)):
+        scene.add_body(box(0.1, 2), RUBBER, (x, 0.0, 0.0), velocity=(v, 0.0, 0.0))
+    model, state, work = stages(scene, dt=dt)
+    x1 = wp.array(state.x.numpy() + dt * state.v.numpy(), dtype=wp.vec3)
+    broad_phase.refresh(model, state.x, x1, work)
+    verts = listed(work.broad_phase.verts)
+    front = np.flatnonzero(box(0.1, 2).vertices[:, 0] > 0.04)
+    assert {(27 + int(i), 2) for i in front} <= verts
+
+
+def test_new_pairs_are_looked_at_at_once(stages):
+    """Not only once they have travelled as far as pairs before them were apart."""
+    scene = Scene()
+    for k in range(2):
+        scene.add_body(box(0.1, 2), RUBBER, (0.12 * k, 0.0, 0.0))
+    model, state, work = stages(scene)
+    ahead = state.x.numpy().copy()
+    ahead[27:, 0] -= 0.04
+    ahead = wp.array(ahead, dtype=wp.vec3)
+    for x, found in ((state.x, False), (ahead, True)):
+        work.broad_phase.stale.fill_(1)
+        broad_phase.refresh(model, x, ahead, work)
+        narrow_phase.find_inner_vertices(model, x, x, work)
+        assert (work.contacts.n_vertex.numpy()[0] > 0) == found
 
 
 def test_a_fast_body_does_not_reach_for_others_with_its_own_skin(stages):

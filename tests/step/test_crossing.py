@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, TetMesh, box
 from warp_contact.scene.scene import rotation_matrix
+from warp_contact.step import broad_phase, narrow_phase
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 DEPTH = 0.02
@@ -119,16 +121,78 @@ def test_a_piece_under_a_face_is_led_out_by_its_deep_end(stages, find_contacts, 
     np.testing.assert_allclose(own, rotate @ (part * enter + (1.0 - part) * leave), atol=1e-4)
 
 
+def wedge() -> TetMesh:
+    """A ridge of 19 degrees along y, at z = 0."""
+    corners = [[s, y, -3.0 if s else 0.0] for y in (-1.0, 1.0) for s in (-0.5, 0.5, 0.0)]
+    return TetMesh(corners, [[0, 1, 2, 3], [1, 2, 3, 4], [2, 3, 4, 5]])
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_sharp_ridges_lead_each_other_out_along_their_common_perpendicular(
+    rng, stages, find_contacts, turned, apart
+):
+    """Although the sides of a ridge are six times nearer than it."""
+    scene, rotate = Scene(), rotation_matrix(turn := turned())
+    half = 0.5**0.5
+    scene.add_body(wedge(), RUBBER, rotation=turn)
+    # Upside down, and across: about the diagonal of x and y.
+    other = wedge().transformed(rotation_matrix((half, half, 0.0, 0.0)))
+    x = rotate @ (*rng.uniform(-0.2, 0.2, 2), -DEPTH)
+    scene.add_body(other, RUBBER, x, turn)
+    model, state, work = stages(scene)
+    inside = wp.array(state.x.numpy(), dtype=wp.vec3)
+    if apart:  # it came in within the step
+        start = state.x.numpy()
+        start[6:] += (DEPTH + 1e-3) * rotate[:, 2].astype(np.float32)
+        state.x.assign(start)
+    c = find_contacts(model, work, state.x, inside, edges=True, apart=apart)
+    ridges = [k for k in range(c.n) if set(c.vert[k, :2]) in ({2, 5}, {8, 11})]
+    assert len(ridges) == 2
+    for k in ridges:
+        sign = 1.0 if c.pair[k, 0] == 1 else -1.0
+        np.testing.assert_allclose(c.normal[k], sign * rotate[:, 2], atol=1e-4)  # float32
+        assert c.depth[k] == pytest.approx(DEPTH, abs=2e-6)
+
+
+def test_edges_that_come_nearer_in_small_steps_are_found_in_time(rng, stages, turned):
+    """A pair that is apart is left alone, but not for longer than it takes to touch."""
+    scene = crossed(rng, turn := turned(), np.zeros(3))
+    up = rotation_matrix(turn)[:, 2].astype(np.float32)
+    model, state, work = stages(scene)
+    x0 = state.x.numpy()
+    x0[4:] += np.float32(2.0 * DEPTH) * up  # above each other by DEPTH
+
+    def lowered(by: float) -> wp.array:
+        x = x0.copy()
+        x[4:] -= np.float32(by) * up
+        return wp.array(x, dtype=wp.vec3)
+
+    start = lowered(0.0)
+    broad_phase.refresh(model, start, lowered(2.0 * DEPTH), work)
+    narrow_phase.clear_places(work)
+    found = []
+    for by in np.arange(0.0, 1.6, 0.1) * DEPTH:
+        narrow_phase.find_inner_edges(model, start, lowered(by), work)
+        found.append(int(work.narrow_phase.n_crossing.numpy()[0]))
+    assert found[:10] == [0] * 10 and found[11:] == [2] * 5
+    # New pairs are looked at at once, however far apart those before them were.
+    for by, crossings in ((0.0, 0), (1.5, 2)):
+        work.broad_phase.stale.fill_(1)
+        x = lowered(by * DEPTH)
+        broad_phase.refresh(model, x, lowered(2.0 * DEPTH), work)
+        narrow_phase.clear_places(work)
+        narrow_phase.find_inner_edges(model, x, x, work)
+        assert work.narrow_phase.n_crossing.numpy()[0] == crossings
+
+
 @pytest.mark.parametrize("friction", [0.0, 1.0])
 def test_sharp_wedges_hold_each_other_and_gain_no_energy(friction):
-    """Ridges of 19 degrees: the middle of the inner piece is closer to the sides than to them."""
-    corners = [[s, y, -3.0 if s else 0.0] for y in (-1.0, 1.0) for s in (-0.5, 0.5, 0.0)]
-    wedge = TetMesh(corners, [[0, 1, 2, 3], [1, 2, 3, 4], [2, 3, 4, 5]])
+    """The middle of the inner piece is closer to the sides of a ridge than to it."""
     soft = NeoHookean(1e5, 0.4, 1000.0)
     scene = Scene(friction=friction)
-    scene.add_body(wedge, soft, fixed=True)
+    scene.add_body(wedge(), soft, fixed=True)
     half = 0.5**0.5
-    scene.add_body(wedge, soft, (0.0, 0.0, 1e-4), (half, half, 0.0, 0.0))  # upside down, across
+    scene.add_body(wedge(), soft, (0.0, 0.0, 1e-4), (half, half, 0.0, 0.0))  # upside down, across
     sim = Simulation(scene, fps=200)
     first = sim.measure()
     weight_height = sim.model.mass.numpy().sum() * 9.81 * 1.0

@@ -8,6 +8,7 @@ import warp as wp
 
 from warp_contact import NeoHookean, Scene, TetMesh, box, sphere
 from warp_contact.scene.scene import rotation_matrix
+from warp_contact.step import narrow_phase
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 
@@ -134,6 +135,37 @@ def test_a_vertex_goes_back_by_the_side_it_came_in_by(rng, stages, find_contacts
     (k,) = np.flatnonzero(c.vert[:, 0] == len(x) - 4)
     np.testing.assert_allclose(c.normal[k], rotate[:, 2], atol=1e-5)  # float32
     assert c.depth[k] == pytest.approx(depth, abs=1e-6)
+
+
+@pytest.mark.parametrize(("rise", "by_ray"), [(0.5, True), (0.12, False)])
+def test_a_ray_much_longer_than_the_depth_gives_way_to_the_closest_point(
+    rng, stages, find_contacts, turned, monkeypatch, rise, by_ray
+):
+    """A direction that leans so much that it leads out far away."""
+    scene, rotate = Scene(), rotation_matrix(turn := turned())
+    depth = 0.05
+    scene.add_body(box(2.0, 4), RUBBER, rotation=turn)
+    tip = TetMesh([[0, 0, 0], [0.3, 0, 1.0], [-0.2, 0.3, 1.0], [-0.2, -0.3, 1.0]], [[0, 1, 2, 3]])
+    place = np.array([*rng.uniform(-0.2, 0.2, 2), 1.0 - depth])
+    scene.add_body(tip, RUBBER, rotate @ place, turn)
+    model, state, work = stages(scene)
+    lean = rotate @ [np.sqrt(1.0 - rise**2), 0.0, rise]
+    first, find_depths = model.n_vert - 4, narrow_phase.find_depths
+
+    def leaning(model, x, work) -> None:
+        find_depths(model, x, work)
+        penetration = work.narrow_phase.penetration.numpy()
+        own = penetration["vert"] == first
+        assert own.any()
+        penetration["direction"][own], penetration["depth"][own] = lean, depth
+        work.narrow_phase.penetration.assign(penetration)
+
+    monkeypatch.setattr(narrow_phase, "find_depths", leaning)
+    c = find_contacts(model, work, state.x)
+    (k,) = np.flatnonzero(c.vert[:, 0] == first)
+    # A ray is good for three depths; the flat one would take eight.
+    np.testing.assert_allclose(c.normal[k], lean if by_ray else rotate[:, 2], atol=1e-5)  # float32
+    assert c.depth[k] == pytest.approx(depth / rise if by_ray else depth, abs=3e-6)
 
 
 class Reference:

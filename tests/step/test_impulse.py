@@ -46,16 +46,23 @@ def momentum_changes(model, x0, v0, v1) -> tuple[float, float]:
     return linear, angular
 
 
+def untaken(model, x0, c) -> float:
+    """Most angular momentum that friction adds where a triangle is too thin to take its torque."""
+    gap = np.einsum("ck,cki,ci->c", c.coef, x0[c.vert], c.normal) - c.offset
+    thin = (c.turn == 0.0).all(axis=(1, 2))
+    return float((thin * np.abs(gap) * np.linalg.norm(c.friction_impulse, axis=1)).sum())
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_impulses_keep_the_momentum(rng, stages, find_contacts, records, jittered, friction):
     scene = meeting(rng, jittered, friction)
     model, x0, v0, v1, c = exchanged(scene, stages, find_contacts, records)
     linear, angular = momentum_changes(model, x0, v0, v1)
-    assert (c.normal_impulse > 0.0).sum() > 10
-    # Each of up to 48 sweeps rounds every velocity of up to 5 m/s; heavy ones hardly change.
-    assert linear < 1e-5
-    # Overlaps this deep are further than a torque reaches: only without friction.
-    assert friction > 0.0 or angular < 1e-5
+    passed = np.abs(model.mass.numpy()[:, None] * (v1 - v0)).sum()
+    assert (c.normal_impulse > 0.0).any()
+    # Each of up to 48 sweeps rounds every velocity of up to 5 m/s; heavy ones hardly change. The
+    # worst of 1500 draws is 4e-6.
+    assert linear < 1e-5 and angular < 1e-5 + untaken(model, x0, c) / passed
 
 
 def test_friction_across_a_gap_keeps_the_angular_momentum(
@@ -67,14 +74,12 @@ def test_friction_across_a_gap_keeps_the_angular_momentum(
     used = c.normal_impulse > 0.0
     assert used.sum() > 10 and (c.gap[used] > 1e-3).mean() > 0.5
     torques = (c.gap * np.linalg.norm(c.friction_impulse, axis=1)).sum()
-    # A triangle that is too thin for its gap takes no torque: friction then turns the pair.
-    untaken = np.linalg.norm(c.friction_impulse, axis=1)[c.gap == 0.0].sum() * 0.03
     linear, angular = momentum_changes(model, x0, v0, v1)
     passed = np.abs(model.mass.numpy()[:, None] * (v1 - v0)).sum()
     print(f"torques of the friction {torques / passed:.1e} m")
     assert torques > 1e-4 * passed
     # As above, of velocities of 50 m/s that change by a part; weights on cells of 1/3 m round.
-    assert linear < 1e-5 and angular < 1e-5 + untaken / passed
+    assert linear < 1e-5 and angular < 1e-5 + untaken(model, x0, c) / passed
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5, 5.0])
@@ -148,16 +153,26 @@ def test_without_friction_impulses_are_between_the_normals_and_those_of_the_face
     assert climbs > 0
 
 
-def test_no_contact_approaches_further_than_its_gap(rng, stages, find_contacts, records, jittered):
-    scene = meeting(rng, jittered, 0.3)
-    model, _, _, v1, c = exchanged(scene, stages, find_contacts, records, edges=False)
-    u = np.einsum("ck,cki,ci->c", c.coef, v1[c.vert], c.normal)
-    used = c.inv_mass > 0.0
-    too_far = -DT * (u + np.maximum(c.gap_bound, 0.0))[used] / model.body_edge.numpy()[0]
-    print(f"worst {too_far.max():.1e} of an edge")
-    # The sweeps end at their tolerance, or after 48 with some clusters of contacts to go: 3.4e-5 is
-    # the worst of 30 draws.
-    assert np.median(too_far) < impulse.IMPULSE_TOLERANCE and too_far.max() < 1e-3
+# Blocks that overlap from the start, and blocks with gaps that close within the step.
+@pytest.mark.parametrize("apart", [{}, {"part": 0.01, "spacing": 1.012, "speed": 25.0}])
+def test_contacts_approach_by_their_gap_and_no_further(
+    rng, stages, find_contacts, records, jittered, apart
+):
+    scene = meeting(rng, jittered, 0.3, **apart)
+    model, x0, _, v1, c = exchanged(scene, stages, find_contacts, records, edges=False)
+    edge = model.body_edge.numpy()
+    coef, normal = c.coef.astype(float), c.normal.astype(float)
+    u = np.einsum("ck,cki,ci->c", coef, v1[c.vert], normal)
+    gap = np.einsum("ck,cki,ci->c", coef, x0[c.vert], normal) - c.offset
+    room = np.maximum(gap - 2e-4 * edge[c.pair[:, 0]], 0.0)  # down to the resting gap
+    too_far = (-DT * u - room)[c.inv_mass > 0.0] / edge[0]
+    pushed = c.normal_impulse > 0.0
+    off = np.abs(-DT * u - room)[pushed] / edge[0]  # what pushes is at its limit
+    print(f"worst {too_far.max():.1e} of an edge, off {np.median(off):.1e}")
+    assert (room[pushed] > 0.0).any() if apart else pushed.any()
+    # The sweeps end at a tolerance of 1e-5, or after 48 with some clusters of contacts to go:
+    # 1.9e-4 at worst in 60 draws at 50 m/s.
+    assert np.median(too_far) < 1e-5 and too_far.max() < 6e-4 and np.median(off) < 3e-5
 
 
 def test_fixed_vertices_keep_their_velocity(rng, stages, find_contacts, records, jittered):
@@ -169,7 +184,7 @@ def test_fixed_vertices_keep_their_velocity(rng, stages, find_contacts, records,
     assert not np.array_equal(v1[~held], v0[~held])
 
 
-def test_recorded_impulses_of_a_pair_are_its_sum(rng, stages, find_contacts, jittered):
+def test_recorded_impulses_are_those_that_the_velocities_got(rng, stages, find_contacts, jittered):
     scene = meeting(rng, jittered, 0.5)
     unit = 1e-9
     model, state, work = stages(scene, dt=DT, unit=unit)
@@ -179,16 +194,40 @@ def test_recorded_impulses_of_a_pair_are_its_sum(rng, stages, find_contacts, jit
     impulse.exchange(model, state.v, work)
     impulse.add_forces(work)
     mass = model.mass.numpy().astype(float)[:, None]
-    first = np.flatnonzero(model.vert_body.numpy() == 0)
+    change = mass * (state.v.numpy() - v0)
+    # The velocities round, the impulses do not: heavy vertices by more than light ones.
+    rounding = 2e-6 * mass * np.abs(v0).max()
+    assert (np.abs(work.forces.received.numpy() - change) <= rounding + 1e-5 * np.abs(change)).all()
+    first = model.vert_body.numpy() == 0
     got = np.zeros(3)
     forces = work.forces
     for key, total in zip(forces.pair_key.numpy(), forces.pair_total.numpy(), strict=True):
         if key >= 0 and key >> 32 == 0:
             got += unit * total
-    change = (mass * (state.v.numpy() - v0))[first].sum(axis=0)
-    # The velocities of 64 vertices round, the impulses of their contacts do not.
-    np.testing.assert_allclose(got, change, rtol=1e-4, atol=1e-4 * np.abs(change).max())
+    of_first = change[first].sum(axis=0)
+    np.testing.assert_allclose(got, of_first, rtol=1e-4, atol=1e-4 * np.abs(of_first).max())
     assert np.abs(got).max() > 0.0
+
+
+def test_no_sliding_is_answered_more_strongly_than_the_mass_says(
+    rng, stages, find_contacts, records, jittered
+):
+    """W_t bounds the eigenvalues of u(p), with the shares of the masses, the torque included."""
+    scene = meeting(rng, jittered, 0.5, part=0.1, spacing=1.012, speed=25.0)
+    model, _, _, _, c = exchanged(scene, stages, find_contacts, records)
+    inv_mass = model.inv_mass.numpy().astype(float)
+    real = np.abs(c.coef).sum(axis=1) > 0.0
+    used = [np.unique(vert) for vert in c.vert[real]]
+    sharing = np.bincount(np.concatenate(used), minlength=model.n_vert)
+    turning = 0
+    for k in np.flatnonzero(real & (c.gap != 0.0)):
+        n, a, vert = c.normal[k].astype(float), c.coef[k].astype(float), c.vert[k]
+        parts = a[:, None, None] * np.eye(3) + c.gap[k] * np.einsum("i,kj->kij", n, c.turn[k])
+        share = inv_mass[vert] * sharing[vert]
+        strongest = np.linalg.eigvalsh(np.einsum("k,kij,kil->jl", share, parts, parts))[-1]
+        assert strongest <= c.inv_mass_turning[k] * (1.0 + 1e-5)  # rounding
+        turning += strongest > 1.01 * c.inv_mass[k]
+    assert turning > 0
 
 
 def test_blocks_of_one_tet_fall_flat_on_a_plane(stages, find_contacts, records):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warp_contact import NeoHookean, Scene, TetMesh, box
 from warp_contact.step import broad_phase, narrow_phase
@@ -31,6 +32,22 @@ def test_hashing_finds_what_brute_force_finds(rng, stages, jittered, turned, bru
     assert len(pairs) == len(set(pairs))
     assert sure <= set(pairs) <= sure | doubtful
     assert not work.overflow.all.numpy().any()
+
+
+def test_equal_hashes_list_no_vertex_twice(rng, stages, turned, brute_force):
+    """In a table of so few places that most cells share one with others that a tet visits."""
+    scene = Scene()
+    for _ in range(2):
+        scene.add_body(box(1.0, 5), RUBBER, rng.uniform(-0.2, 0.2, 3), turned())
+    model, state, work = stages(scene)
+    work.broad_phase.cell_start = wp.zeros(4, dtype=int)
+    pairs = found(model, state, work)
+    listed = work.broad_phase.verts
+    for first, end in listed.list.items.numpy()[: listed.n.numpy()[0]]:
+        tets = listed.list.item.numpy()[first:end]
+        assert len(np.unique(tets)) == len(tets)
+    sure, doubtful = brute_force(scene, state.x.numpy().astype(float))
+    assert sure <= set(pairs) <= sure | doubtful
 
 
 def test_a_body_near_very_many_others_misses_none(rng, stages, jittered, turned, brute_force):

@@ -63,7 +63,10 @@ def test_literal_shares_the_overlap_within_its_last_step(stages, find_contacts, 
     assert np.abs(share[upper] - 1.0 / (1.0 + ratio)).max() <= 1.0 / 32.0 + 5e-3
 
 
-def test_a_side_that_is_pressed_already_yields_less_or_more(stages, find_contacts, records):
+@pytest.mark.parametrize("iterations", [3, 4, 16])
+def test_a_side_that_is_pressed_already_yields_less_or_more(
+    stages, find_contacts, records, iterations
+):
     # a = (P0_upper - P0_lower + k) / 2 k with k = E overlap / cell: a quarter less for the lower.
     strain = 0.5 * OVERLAP / (0.25 * EDGE)
     model, state, work = stages(blocks(1.0))
@@ -73,14 +76,14 @@ def test_a_side_that_is_pressed_already_yields_less_or_more(stages, find_contact
     state.x.assign(x)
     find_contacts(model, work, state.x)
     residual.find_gaps(model, state.x, work)
-    # An imbalance is corrected by a quarter at a time: 0.75^15 of it is left.
-    search.balance(model, state.x, work, iterations=16)
+    search.balance(model, state.x, work, iterations)
+    left = 0.25 * 0.75 ** (iterations - 1)  # an imbalance is corrected by a quarter at a time
     share = work.surface.fraction.numpy()
     one, two = inner(model, work)
     assert len(one) == len(two) == 9
     # Nonlinear to the order of the strains of 4e-3; float32 forces at a strain of 2e-3.
-    np.testing.assert_allclose(share[one], 0.25, atol=0.02)
-    np.testing.assert_allclose(share[two], 0.75, atol=0.02)
+    np.testing.assert_allclose(share[one], 0.25 + left, atol=0.02)
+    np.testing.assert_allclose(share[two], 0.75 - left, atol=0.02)
 
 
 def test_both_sides_of_the_balanced_search_meet(rng, stages, find_contacts, records, jittered):
@@ -97,6 +100,38 @@ def test_both_sides_of_the_balanced_search_meet(rng, stages, find_contacts, reco
     assert len(total) > 20
     # Where the meshes do not match, interpolation to and fro leaves this much of an overlap.
     assert np.abs(total - 1.0).mean() < 0.075
+
+
+@pytest.mark.parametrize("search_for", ["balanced", "literal"])
+def test_a_triangle_that_is_partly_fixed_counts_by_its_free_vertices(
+    rng, stages, find_contacts, records, jittered, search_for
+):
+    """What is fixed moves by nothing, and its pressure says nothing."""
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    for k, cells in enumerate((3, 4)):
+        mesh = jittered(EDGE, cells, 0.2)
+        held = rng.random(len(mesh.vertices)) < 0.4
+        scene.add_body(mesh, NeoHookean(1e5, 0.3, 1000.0), (0.0, 0.0, 0.9 * k * EDGE), fixed=held)
+    response = ContactSurface(search_for, iterations=4)
+    model, state, work, c = searched(scene, stages, find_contacts, records, response)
+    region = np.linalg.norm(work.surface.s.numpy(), axis=1) > 0.0
+    fixed = model.inv_mass.numpy() == 0.0
+    np.testing.assert_array_equal(state.x.numpy()[fixed], work.x.numpy()[fixed])
+    # What the last pass saw of both sides. Where all are fixed there is a fraction of -1.
+    value = work.surface.at_trial.numpy().astype(float)
+    value[fixed] = np.nan  # not to be looked at
+    mixed = 0
+    for ks, means in (([0, 1], work.surface.upper_mean), ([2, 3, 4], work.surface.lower_mean)):
+        w = np.abs(c.coef[:, ks]) * region[c.vert[:, ks]]
+        seen = np.where(w > 0.0, value[c.vert[:, ks]], 0.0)
+        some = w.sum(axis=1) > 0.0
+        want = (w * seen).sum(axis=1)[some] / w.sum(axis=1)[some]
+        found = means.numpy()[: c.n]
+        size = np.abs(value[region]).max()
+        np.testing.assert_allclose(found[some, 0], want, atol=1e-5 * size)  # rounding
+        np.testing.assert_array_equal(found[~some, 2], -1.0)
+        mixed += (some & (fixed[c.vert[:, ks]] & (c.coef[:, ks] != 0.0)).any(axis=1)).sum()
+    assert mixed > 0
 
 
 def nodal_forces(model, x: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdShade
 
+from warp_contact.scene.scene import rotation_matrix
 from warp_contact.usd import reader, writer
 from warp_contact.usd.check import problems
 from warp_contact.usd.writer import UsdWriter
@@ -73,6 +74,20 @@ def test_layout_metadata_and_schemas(tmp_path):
     assert look.GetPath() == "/World/Looks/contact"
     ((n, h),) = reader.read_planes(stage)
     assert (*n, h) == (0.0, 0.0, 1.0, 0.0)
+
+
+def test_a_plane_is_drawn_where_it_is(tmp_path, turned):
+    sim = FakeSimulation()
+    n, h = rotation_matrix(turned())[:, 2], 0.7
+    sim.model.plane_n.assign(np.array([n]))
+    sim.model.plane_h.assign(np.array([h]))
+    stage = written(tmp_path / "run", 1, sim=sim)
+    ground = UsdGeom.Mesh.Get(stage, "/World/ground")
+    corners = np.array(ground.GetPointsAttr().Get())
+    # Coordinates of some tens in float32.
+    np.testing.assert_allclose(corners @ n, h, atol=1e-5)
+    a, b, c, _ = corners
+    assert np.cross(b - a, c - a) @ n > 0.0
 
 
 def test_labels_become_valid_and_different_prims(tmp_path):

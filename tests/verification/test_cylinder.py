@@ -43,6 +43,5 @@ def test_a_cylinder_presses_on_a_plane_as_hertz_says(n, hold):
     hold(hertz.line_on_plane(n, Pose()), "excellent", but={"half-width": "good"})
 
 
-@pytest.mark.slow
 def test_a_turned_cylinder_with_four_elements_has_the_pressure_of_hertz(hold):
     hold(hertz.line_on_plane(4, Pose(True)), "excellent", but={"half-width": "good"})

@@ -13,7 +13,6 @@ def test_a_block_slides_over_facets_without_feeling_them(ratio, hold):
     hold(facets.drag(ratio, fixed=True), "excellent")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("ratio", facets.RATIOS)
 def test_without_weights_the_force_jumps_while_a_block_slides(ratio):
     found = list(facets.compare(ratio))

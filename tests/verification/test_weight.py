@@ -22,6 +22,6 @@ def test_three_points_share_the_weight_as_the_moments_say(hold):
     assert len(set(values.values())) == 3  # they are not alike
 
 
-@pytest.mark.parametrize("ratio", [1.0, 100.0, 1e4])
+@pytest.mark.parametrize("ratio", [1.0, 100.0])
 def test_a_light_block_carries_a_heavy_one(ratio, hold):
     hold(weight.carry(ratio), "excellent")

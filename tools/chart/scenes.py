@@ -28,10 +28,7 @@ FRAMES = 60
 CONVERGED = 16  # times the steps
 LATE = 0.25  # part of the frames at the end in which the bodies of a pair touch
 TUNNELLED = 1.0  # of an edge: an overlap or gap from which a body is on the wrong side
-TITLES = {
-    "squeezed_sphere": "squeezed sphere",
-    "cubes_on_membrane": "cubes on a membrane 1:4:16",
-}
+TITLES = {"squeezed_sphere": "squeezed sphere", "cubes_on_membrane": "cubes on a membrane 1:4:16"}
 # Bodies that are squeezed together, or rest on each other, by their labels.
 PRESSED = [("lower_cube", "sphere"), ("sphere", "upper_cube")]
 PRESSED += [("membrane", f"cube_{mass}") for mass in (1, 4, 16)]

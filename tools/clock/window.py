@@ -106,8 +106,7 @@ class _Window:
         """Time of each step [ms]."""
         self.restore()
         wp.synchronize_device(self._device)
-        launch = wp.capture_launch
-        return [milliseconds(self._device, launch, graph) for _ in range(self._steps)]
+        return [milliseconds(self._device, wp.capture_launch, graph) for _ in range(self._steps)]
 
     def operations(self) -> list[tuple[str, float]]:
         """Stage and time [ms] of every operation of the window, in order."""

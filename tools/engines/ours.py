@@ -63,8 +63,7 @@ def run(task: Task, setting: Own, substeps: int | None, limit: float) -> Motion:
     """The motion in a task; without ``substeps`` their number is left to the simulation."""
 
     def make() -> Engine:
-        response = setting.response(task)
-        sim = Engine(task.scene(), response, task.fps, substeps, device="cpu")
+        sim = Engine(task.scene(), setting.response(task), task.fps, substeps, device="cpu")
         sim.state.x.assign(task.start(sim.scene).astype(np.float32))
         return sim
 

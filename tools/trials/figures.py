@@ -31,8 +31,7 @@ def cases() -> Iterator[Case]:
     fruit = {"fraction": 0.15}
     yield case("B7 bowl, 15% of the fruit", paper, "bowl", 0.5, {"pairs": ()}, **fruit)
     yield case("Fig. 1 arches on slabs", paper, "sampling", 2.0, PAIRED)
-    inside = PAIRED | {"recovers": True}
-    yield case("Fig. 6 two pairs of blocks", paper, "two_bodies", 2.0, inside)
+    yield case("Fig. 6 two pairs of blocks", paper, "two_bodies", 2.0, PAIRED | {"recovers": True})
 
 
 def tilts() -> Iterator[Case]:

@@ -62,8 +62,7 @@ def edges(angle: float) -> Setting:
 
 def beams(angle: float) -> Setting:
     """Two flat beams lie across each other: no vertex of one is inside the other."""
-    flat = wc.box((4.0 * EDGE, EDGE, 0.5 * EDGE), (4, 1, 1))
-    return meet(flat, 0.0, angle, 0.25 * EDGE)
+    return meet(wc.box((4.0 * EDGE, EDGE, 0.5 * EDGE), (4, 1, 1)), 0.0, angle, 0.25 * EDGE)
 
 
 def meet(mesh: wc.TetMesh, tilt: float, angle: float, half: float) -> Setting:
@@ -117,8 +116,7 @@ def driven() -> Setting:
     bodies = [body(wc.box((2.0 * EDGE, 2.0 * EDGE, 0.2 * EDGE), (3, 3, 1)), fixed=True)]
     for side in (-1.0, 1.0):
         cube = wc.box(EDGE, 2)
-        held = side * cube.vertices[:, 2] > 0.049
-        bodies.append(body(cube, at=side * 0.61 * EDGE, fixed=held))
+        bodies.append(body(cube, at=side * 0.61 * EDGE, fixed=side * cube.vertices[:, 2] > 0.049))
 
     def drive(sim: wc.Simulation) -> None:
         sim.set_velocity(0, (0.0, 0.0, 0.1 * np.cos(2.0 * np.pi * 2.0 * sim.time)))

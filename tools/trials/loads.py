@@ -70,8 +70,7 @@ def heavy(seconds: float, speed: float = 0.0) -> Setting:
 def column(density: float, young: float) -> Setting:
     """A cube on one that is held; the lower one is strained by 5 % at rest, by the heavier one."""
     base = 20.0 * max(density, 1.0) * 1000.0 * 9.81 * EDGE * max(1.0, 1.0 / young)
-    high = soft(base * young, 1000.0 * density)
-    upper = body(wc.box(EDGE, 3), high, (0.004, 0.003, EDGE + 1e-3))
+    upper = body(wc.box(EDGE, 3), soft(base * young, 1000.0 * density), (0.004, 0.003, EDGE + 1e-3))
     return setting(body(wc.box(EDGE, 2), soft(base), fixed="base"), upper, seconds=0.3)
 
 

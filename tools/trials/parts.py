@@ -113,8 +113,7 @@ def crushed() -> float:
     sim = wc.Simulation(setting.scene, fps=setting.fps)
     start = sim.measure().energy
     frames = round(setting.seconds * setting.fps)
-    most = max(sim.measure().energy for _ in sim.frames(frames))
-    return max(most / start - 1.0, 0.0)
+    return max(max(sim.measure().energy for _ in sim.frames(frames)) / start - 1.0, 0.0)
 
 
 def sheet() -> float:

@@ -101,8 +101,7 @@ def crack(shape) -> Setting:
 def meet(low, low_turn, high, high_turn, aside=(0.0, 0.0)) -> Setting:
     """A body hits a fixed one, without gravity; ``aside`` keeps them off the symmetric place."""
     lower = body(low(), turn=low_turn, fixed=True)
-    upper = body(high(), turn=high_turn, v=-SPEED)
-    s = setting(lower, upper, gravity=NONE, seconds=0.6)
+    s = setting(lower, body(high(), turn=high_turn, v=-SPEED), gravity=NONE, seconds=0.6)
     a, b = s.scene.bodies
     b.x[:] += [*aside, a.x[:, 2].max() + GAP - b.x[:, 2].min()]
     return s

@@ -50,8 +50,7 @@ def build(tan: float, mu: float, velocity=(0.0, 0.0, 0.0)) -> wc.Scene:
     scene = wc.Scene(G * np.array([tan, 0.0, -1.0]) / np.hypot(tan, 1.0), mu)
     scene.add_plane((0.0, 0.0, 1.0))
     material = wc.NeoHookean(YOUNG, POISSON, DENSITY, DAMPING)
-    place = 0.0, 0.0, 0.5 * EDGE + GAP
-    scene.add_body(wc.box(EDGE, CELLS), material, place, velocity=velocity)
+    scene.add_body(wc.box(EDGE, CELLS), material, (0.0, 0.0, 0.5 * EDGE + GAP), velocity=velocity)
     return scene
 
 

@@ -57,8 +57,7 @@ def block(size, cells, mesh: str = "structured", seed: int = 0) -> wc.TetMesh:
     half = x.max(axis=0)
     cell = 2.0 * half / np.broadcast_to(np.asarray(cells), 3)
     shift = np.random.default_rng(seed).uniform(-JITTER, JITTER, x.shape) * cell
-    inside = np.abs(x) < half - 0.01 * cell
-    return wc.TetMesh(x + np.where(inside, shift, 0.0), regular.tets)
+    return wc.TetMesh(x + np.where(np.abs(x) < half - 0.01 * cell, shift, 0.0), regular.tets)
 
 
 def on_face(mesh: wc.TetMesh, axis: int, side: int) -> np.ndarray:

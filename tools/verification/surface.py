@@ -46,8 +46,7 @@ def found(way: str, law, poisson: float, cells, ratio: float) -> wc.Simulation:
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
     upper = wc.box(EDGE, cells[1], mirrored=cells[0] % 2 == 1)
     scene.add_body(wc.box(EDGE, cells[0]), law(YOUNG, poisson, DENSITY), (0, 0, 0.5 * EDGE))
-    high = (0.0, 0.0, 1.5 * EDGE - OVERLAP)
-    scene.add_body(upper, law(ratio * YOUNG, poisson, DENSITY), high)
+    scene.add_body(upper, law(ratio * YOUNG, poisson, DENSITY), (0.0, 0.0, 1.5 * EDGE - OVERLAP))
     sim = wc.Simulation(scene, wc.ContactSurface(way))
     model, state, tries = sim.model, sim.state, sim.response.iterations
     work = allocate_work(model, state, ROOM)
@@ -74,8 +73,7 @@ def place(case: str, way: str, law, poisson: float, cells, ratio) -> Figures:
     x = [sim.positions(body) for body in sim.scene.bodies]
     tris = [facing(b.x, b.mesh.surface, (1.0, -1.0)[b.index]) for b in sim.scene.bodies]
     for name, at, own in zip(("lower", "upper"), x, tris, strict=True):
-        z = at[np.unique(own), 2].astype(float)
-        off = 100.0 * (z.mean() - expected) / OVERLAP
+        off = 100.0 * (at[np.unique(own), 2].astype(float).mean() - expected) / OVERLAP
         yield zero(case, f"surface of the {name} block [% of overlap]", off, most)
     # At the vertices of both surfaces; nan beside the other one.
     top, bottom = (at[np.unique(own)] for at, own in zip(x, tris, strict=True))

@@ -76,8 +76,7 @@ class UsdWriter:
             ValueError: the path cannot be that of a root layer; what is to be resumed is damaged
         """
         check_options(sim, view, pressure_scale, (velocities, tets, flatten, animate_tets, resume))
-        taken = isinstance(path, RunFolder)
-        self.folder = path if taken else RunFolder(path, overwrite, resume)
+        self.folder = _folder(path, overwrite, resume)
         self.sim, self.velocities, self.flatten = sim, velocities, flatten
         self.animate_tets = animate_tets and tets
         self.start, self.end, self.notes = None, None, []
@@ -254,3 +253,8 @@ def hydrostatic(sim) -> float:
     x = sim.positions()
     size = float(np.linalg.norm(np.ptp(x, axis=0)))
     return 2.0 * max(densities, default=0.0) * float(np.linalg.norm(sim.model.gravity)) * size
+
+
+def _folder(path, overwrite: bool, resume: bool) -> RunFolder:
+    """The folder of a path, unless it is one."""
+    return path if isinstance(path, RunFolder) else RunFolder(path, overwrite, resume)

@@ -152,3 +152,19 @@ def test_reading_changes_nothing():
     np.testing.assert_array_equal(read.positions(), left.positions())
     np.testing.assert_array_equal(read.velocities(), left.velocities())
     assert read.measure().n_contacts > 0
+
+
+def test_far_from_the_origin_blocks_come_to_rest_where_they_do_at_the_origin():
+    # Not tumbling ones: rounding alone decides on which side these end, anywhere.
+    ends, weight = [], 9.81 * 500.0 * (0.5**3 + 0.3**3)
+    for far in (0.0, 1000.0):  # 5000 edges: a little less than what is refused
+        scene, soft = Scene(friction=0.4), NeoHookean(1e5, 0.3, 500.0, 8e-3)
+        scene.add_plane((0.0, 0.0, 1.0), far)
+        scene.add_body(box(0.5, 3), soft, (0.0, 0.0, far + 0.3))
+        turn = 0.0, 0.0, np.sin(np.radians(10.0)), np.cos(np.radians(10.0))
+        scene.add_body(box(0.3, 2), soft, (0.05, 0.03, far + 0.75), turn)
+        sim = run(Simulation(scene), 150)
+        ends.append([sim.positions(k).mean(axis=0) - [0.0, 0.0, far] for k in (0, 1)])
+        held = [sim.measure().forces["body0", "plane0"] for _ in sim.frames(30)]
+        assert np.mean(held) == pytest.approx(weight, rel=0.01)
+    np.testing.assert_allclose(ends[1], ends[0], atol=0.01 * 0.5)  # 1 % of a size

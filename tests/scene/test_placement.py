@@ -50,7 +50,7 @@ def test_crossed_beams_with_one_middle_and_one_box_are_not():
 def test_a_body_is_refused_where_rounding_drowns_its_gap_at_rest(scale):
     mesh = box(scale * EDGE, 1)
     p, q = mesh.vertices[mesh.edges].swapaxes(0, 1)
-    most = 10.0 * 2e-4 * 2.0**24 * np.linalg.norm(p - q, axis=1).mean()
+    most = 1.5 * 2e-4 * 2.0**24 * np.linalg.norm(p - q, axis=1).mean()
     for far in (0.9 * most, 1.1 * most):
         scene = Scene()
         scene.add_body(mesh, RUBBER, (0.0, -far, 0.0), label="remote")

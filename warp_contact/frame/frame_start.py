@@ -29,18 +29,21 @@ class FrameStart:
         contact_forces.copy(self._forces, work.forces)
 
     def go_back(self, state: State, work: Work) -> None:
-        """Restore the state and the warm start; ``work`` may have more room than there was."""
+        """Restore the state and the warm start; ``work`` may have more room than there was.
+
+        Its lists of pairs may be incomplete, where they did not fit: they are found anew.
+        """
         wp.copy(state.x, self._x)
         wp.copy(state.v, self._v)
         warm_start.copy(work.warm, self._warm)
         damping.copy(work.damping, self._damping)
+        work.broad_phase.stale.fill_(1)
 
     def undo(self, state: State, work: Work) -> None:
         """Restore all, as if the frame had not begun."""
         self.go_back(state, work)
         work.forces.pair_key.fill_(-1)
         contact_forces.copy(work.forces, self._forces)
-        work.broad_phase.stale.fill_(1)
 
     @property
     def n_pair(self) -> int:

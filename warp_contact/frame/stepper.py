@@ -129,9 +129,10 @@ class Stepper:
         in_parts = self._flat()
         for _ in range(ATTEMPTS):
             dt, after, wrong = self._run(omega, rate, frame, in_parts)
-            while self.grow():
-                dt, after, wrong = self._run(omega, rate, frame, in_parts)
             fits = not wrong and self._fits(dt, rate, after)
+            while fits and self.grow():  # what explodes would ask for any number of pairs
+                dt, after, wrong = self._run(omega, rate, frame, in_parts)
+                fits = not wrong and self._fits(dt, rate, after)
             flat = in_parts or bool(wrong) or self._flat()
             if fits and (in_parts or not flat):
                 return dt, after
@@ -240,7 +241,7 @@ class Stepper:
         """Step the frame at the rates [1/s] given.
 
         Return the step [s] and what ``rates_now`` finds at the end. With ``in_parts`` the frame
-        ends as soon as its step no longer fits. Where buffers were too small, nothing was found.
+        ends as soon as its step no longer fits. It ends early where buffers were too small.
         """
         work = self.work
         if self.sleeping:
@@ -262,10 +263,8 @@ class Stepper:
         for first in range(0, n, part):
             work.steps.fill_(min(part, n - first))
             wp.capture_launch(self.buffers.graph(damping_stages, bool(self._overlapping)))
-            if enlarged(work) is not None:
-                break
             after, wrong = rates_now(self._model, self._state, self.spectrum)
-            if wrong or not self._fits(dt, rate, after):
+            if wrong or not self._fits(dt, rate, after) or enlarged(work) is not None:
                 break
         return dt, after, wrong
 

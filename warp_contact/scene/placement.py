@@ -7,7 +7,9 @@ import numpy as np
 from warp_contact.kernels.lengths import REST_GAP, SAME_PLACE
 
 ROUNDING = 2.0**-24  # of a float32, at most
-DROWNED = 10.0  # resting gaps by which rounding may move a body: soft ones tolerate it
+# Resting gaps by which rounding may move a body. At 1.5, 5000 edges away, blocks that fall and come
+# to rest end within 1 % of a size of where they do at the origin, at 3 within 4 %.
+DROWNED = 1.5
 STRAINED = 0.02  # strain that rounding of the positions may put on a tet
 PLAUSIBLE = 0.9e-6, 1.1e3  # size of a body [m]; others run too
 

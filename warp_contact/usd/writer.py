@@ -18,7 +18,7 @@ rounded to a thousandth of their largest value on the body, which packs them to 
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, UsdGeom, Vt
+from pxr import Sdf, Tf, UsdGeom, Vt
 
 from warp_contact.files import replacing
 from warp_contact.usd.folder import TOPOLOGY, RunFolder, frame_file, frame_files
@@ -236,8 +236,13 @@ class UsdWriter:
 def export(layer: Sdf.Layer, path: Path) -> None:
     """Write a layer so that ``path`` is either absent, old or complete."""
     with replacing(path) as part:
-        if not layer.Export(str(part)):
-            raise OSError(f"cannot write {path}")
+        try:
+            is_written, reason = layer.Export(str(part)), "USD does not say why"
+        except Tf.ErrorException as error:  # each of its lines ends with : 'what went wrong'
+            first = str(error).strip().partition("\n")[0]
+            is_written, reason = False, first.split(" : ")[-1].strip("'")
+        if not is_written:
+            raise OSError(f"cannot write {path}: {reason}")
 
 
 def rounded(value: np.ndarray) -> np.ndarray:

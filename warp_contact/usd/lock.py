@@ -42,10 +42,7 @@ def _take(path: Path) -> int | None:
         host, process = _owner(number)
         here = socket.gethostname()
         if not (is_new if is_free is None else is_free) or host not in ("", here):
-            raise FileExistsError(
-                f"{path.parent} is in use by process {process} on {host or 'an unknown machine'}; "
-                f"choose another folder, or remove {path} if that has ended"
-            )
+            raise FileExistsError(f"{path.parent} is in use by {_words(path, host, process)}")
         if not _is_at(path, number):
             os.close(number)
             return None
@@ -90,6 +87,14 @@ def _owner(number: int) -> tuple[str, int]:
         return str(owner["host"]), int(owner["process"])
     except (ValueError, KeyError, TypeError):
         return "", 0
+
+
+def _words(path: Path, host: str, process: int) -> str:
+    """Who has the lock, and the remedy."""
+    if (host, process) == (socket.gethostname(), os.getpid()):
+        return "this process: close what writes there, or choose another folder"
+    where = f"process {process} on {host or 'an unknown machine'}"
+    return f"{where}: choose another folder, or remove {path} if that has ended"
 
 
 def _is_at(path: Path, number: int) -> bool:

@@ -6,9 +6,8 @@
     <dir>/frames/f.000012.usdc  what changes: one file a frame
 
 Each file is written under another name, put on the disk and renamed, a frame before the root that
-counts it. So at any moment the root names finished frames only, and all of them. The files appear
-together with the first frame, or take the place of an earlier run together with the second: the
-first shows the start, and a run may fail before it gets any further.
+counts it. So at any moment the root names finished frames only, and all of them. The files appear,
+or take the place of those of an earlier run, together with the first frame.
 
 Each surface carries ``primvars:contact:pressure`` [Pa], ``penetration`` [m] and ``partner``: the
 index of the other body, n_body + p for half-space p, -1 for none. Pressure and penetration are
@@ -67,7 +66,7 @@ class UsdWriter:
             view: eye and target [m] of a camera to write
             pressure_scale: pressure [Pa] drawn as fully hot; None takes twice the hydrostatic
                 pressure over the scene's size, or without gravity the highest pressure so far
-            overwrite: replace what is there, when a second frame is written or the writer closed
+            overwrite: replace what is there, when the first frame is written
             resume: continue after frame ``sim.frame`` of the earlier file, written with the
                 same arguments; the frames after it are removed
 
@@ -114,8 +113,11 @@ class UsdWriter:
             self.close()
         self.folder.close()
 
-    def write(self, note: str = "") -> None:
-        """Write the state of the simulation as frame ``sim.frame``, and ``note`` in its file."""
+    def write(self, note: str = "", publish: bool = True) -> None:
+        """Write the state of the simulation as frame ``sim.frame``, and ``note`` in its file.
+
+        Without ``publish`` what was there before stays in its place until a later frame.
+        """
         frame = self.sim.frame
         if not self.folder.is_open:
             raise ValueError(f"{self.root} is closed: no frame can be written any more")
@@ -129,16 +131,14 @@ class UsdWriter:
         export(self.layer, frame_file(self.folder.now, frame))
         start = frame if self.start is None else self.start
         self._write_root(start, frame)
-        if self.end is not None or not self.folder.replaces:
+        if publish:
             self.folder.publish()
         self.start, self.end = start, frame
 
     def close(self) -> None:
         """Flatten, if asked to, and let others have the folder."""
-        if self.folder.is_open and self.end is not None:
-            self.folder.publish()
-            if self.flatten:
-                export(open_stage(self.root).Flatten(), self.root.with_suffix(".usdc"))
+        if self.flatten and self.end is not None and self.folder.is_open:
+            export(open_stage(self.root).Flatten(), self.root.with_suffix(".usdc"))
         self.folder.close()
 
     def _check(self) -> None:

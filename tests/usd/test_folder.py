@@ -131,11 +131,16 @@ def test_a_file_of_somebody_else_is_replaced_when_asked_for_and_not_before_a_fra
     assert (tmp_path / "frames" / "notes.txt").read_text() == "mine"
 
 
-def test_what_is_no_file_is_never_replaced(tmp_path):
+def test_what_is_no_file_or_a_folder_elsewhere_is_never_replaced(tmp_path):
     (tmp_path / "x.usda").mkdir()
-    with pytest.raises(FileExistsError, match="is no file"):
-        UsdWriter(tmp_path / "x.usda", FakeSimulation(), overwrite=True)
-    assert names(tmp_path) == []
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "frames").symlink_to(tmp_path)
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "frames").touch()
+    for name in "x.usda", "a", "b":
+        with pytest.raises(FileExistsError, match="is in the way"):
+            UsdWriter(tmp_path / name, FakeSimulation(), overwrite=True)
+    assert names(tmp_path) == ["b/frames"]
 
 
 def test_files_of_killed_processes_are_cleared_away_and_no_others(tmp_path):

@@ -122,8 +122,11 @@ class RunFolder:
         there = [path for path in names if is_there(path)]
         there += frame_files(folder)[:1]
         odd = [path for path in there if not path.is_file()]
+        frames = frames_of(folder)
+        if is_there(frames) and (frames.is_symlink() or not frames.is_dir()):
+            odd.append(frames)  # files are renamed into it, which they cannot across disks
         if odd:
-            raise FileExistsError(f"{odd[0]} is no file: remove it, or choose another folder")
+            raise FileExistsError(f"{odd[0]} is in the way: remove it, or choose another folder")
         if there and not overwrite:
             raise FileExistsError(
                 f"{there[0]} is there already: go on with it (--resume), replace it (--overwrite; "

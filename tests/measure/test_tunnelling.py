@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, TetMesh, box
-from warp_contact.command.run import line_of
+from warp_contact.command.metrics import line_of
 from warp_contact.kernels.output import tunnelling
 from warp_contact.scene.scene import rotation_matrix
 

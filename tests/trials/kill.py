@@ -96,10 +96,9 @@ class Trial:
             self.found["kills"] += 1
             self.found["with hidden files"] += any(out.rglob(".warp_contact.*"))
             sure, option = self.look(out, sure, over)
-        if not same(self.points("run"), self.whole):
+        lines = [(self.place / name / "metrics.jsonl").read_text() for name in ("run", "whole")]
+        if not same(self.points("run"), self.whole) or lines[0] != lines[1]:
             self.note("lost", "the finished run is another one")
-        if (out / "metrics.jsonl").read_text() != (self.place / "whole/metrics.jsonl").read_text():
-            self.note("lost", "the metrics are others")
         for path in out.rglob(".*"):
             self.note("litter", path.name)
 
@@ -112,12 +111,13 @@ class Trial:
             return sure, "--resume"
         if not same(points, self.whole[: len(points)]):
             self.note("wrong", "frames of another run")
-        if not (out / "checkpoint.npz").exists():
-            if over or points:
-                self.note("lost", "no checkpoint")
+        if not (over or points):
             return 0, ""
-        with np.load(out / "checkpoint.npz") as file:
-            sure = max(sure, int(file["frame"]) + 1)
+        try:
+            sure = max(sure, int(np.load(out / "checkpoint.npz")["frame"]) + 1)
+        except Exception as error:  # whatever a torn file leads to
+            self.note("lost", f"the checkpoint: {error}")
+            return 0, "--overwrite"
         if len(points) < sure:
             self.note("lost", f"{len(points)} frames, there were {sure}")
         return sure, "--resume"

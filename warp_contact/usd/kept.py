@@ -29,10 +29,8 @@ def check_layers(root: Path, manifest: Sdf.Layer, labels: list[str]) -> None:
     Raises:
         ValueError: it is of other bodies, or was written with other arguments
     """
-    topology, declared = (
-        read_layer(root.parent / TOPOLOGY),
-        read_layer(root.parent / "manifest.usdc"),
-    )
+    declared = read_layer(root.parent / "manifest.usdc")
+    topology = read_layer(root.parent / TOPOLOGY)
     if declared is not None and declared.ExportToString() != manifest.ExportToString():
         raise ValueError(f"{root} has other bodies, or was written with other arguments")
     if topology is not None and topology.defaultPrim:

@@ -235,7 +235,8 @@ def test_without_memory_for_larger_buffers_the_last_frame_stays(monkeypatch):
     def outgrow(self, *rates):
         self._state.x.fill_(1.0)  # a frame that is not finished
         self.work.overflow.all.fill_(10_000)
-        return 1.0, (0.0, 0.0), ""
+        self._n, self._dt = np.array([1]), np.array([1.0])
+        return np.zeros((2, 1)), ""
 
     with monkeypatch.context() as patch:
         patch.setattr(Buffers, "_allocate", allocate_no_more)

@@ -85,8 +85,8 @@ class Simulation:
 
     @property
     def substeps(self) -> int:
-        """Steps of the last frame."""
-        return self._stepper.last.n
+        """Steps of the last frame, of the world that took most."""
+        return int(self._stepper.last.n.max())
 
     @property
     def time(self) -> float:
@@ -208,7 +208,7 @@ class Simulation:
         with exclusively(self.device):
             duration = 1.0 / self.fps if self.frame else 0.0
             s = self._stepper
-            return self._meter.measure(self.state, s.velocities(), s.work, duration, s.last.dt)
+            return self._meter.measure(self.state, s.velocities(), s.work, duration, s.last_dt)
 
     def contact_fields(self) -> dict[str, np.ndarray]:
         """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.

@@ -72,7 +72,7 @@ def begin_contacts(
     contact: wp.array[Contact],  # (capacity,)
     graph: ContactGraph,
     bodies: Mobility,
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     # out
     constraint: wp.array[Constraint],  # (capacity,)
@@ -86,7 +86,7 @@ def begin_contacts(
         to.inv_mass = w
         to.inv_mass_turning = w
         to.gap = gap(at, x0)
-        to.gap_bound = (to.gap - REST_GAP * at.edge_length) / dt[0]
+        to.gap_bound = (to.gap - REST_GAP * at.edge_length) / dt[at.vert[0]]
         to.friction = friction
         largest = float(0.0)
         if w > 0.0 and not at.on_plane:

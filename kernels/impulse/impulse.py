@@ -84,7 +84,7 @@ def solve_contacts(
     limits: Limits,
     last: bool,  # do not extrapolate the impulses after this sweep
     sweep_number: wp.array[int],  # (1,)
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
@@ -131,7 +131,7 @@ def solve_contacts(
         new = Impulse()
         new.normal = wp.max(y[3] - excess / w, 0.0)
         off = wp.abs(new.normal - y[3]) * w
-        if off * dt[0] > limits.tolerance * at.edge_length and sweep < limits.sweeps:
+        if off * dt[at.vert[0]] > limits.tolerance * at.edge_length and sweep < limits.sweeps:
             again[0] = 1
         if rubs:
             new.friction = allowed(yt - (u - un * n) / w, new.normal, to.friction, to.ramp)
@@ -146,7 +146,7 @@ def solve_contacts(
         for k in range(5):
             part[5 * c + k] = part_of(k, at, to, change)
             served[at.vert[k]] = sweep
-        busy[c] = wp.where(wp.length(change) * w * dt[0] > limits.negligible, 2, 1)
+        busy[c] = wp.where(wp.length(change) * w * dt[at.vert[0]] > limits.negligible, 2, 1)
         new.ahead = wp.vec4(next_friction[0], next_friction[1], next_friction[2], next_normal)
         impulse[c] = new
 
@@ -176,7 +176,7 @@ def apply_sweep(
     threads: int,
     negligible: float,  # [m] a smaller change in a step is negligible for other contacts
     sweep: wp.array[int],  # (1,)
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     graph: ContactGraph,
     part: wp.array[wp.vec3],  # (5 capacity,) [N s]
     bodies: Mobility,
@@ -196,4 +196,4 @@ def apply_sweep(
         g = mobility_of(i, bodies)
         v[i] = v[i] + g * p
         received[i] = received[i] + p
-        changed[i] = wp.where(wp.length(p) * g * dt[0] > negligible, sweep[0], 0)
+        changed[i] = wp.where(wp.length(p) * g * dt[i] > negligible, sweep[0], 0)

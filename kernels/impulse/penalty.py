@@ -23,7 +23,7 @@ def penalty_impulses(
     stiffness: float,  # [N/m]
     damping: float,  # [N s/m]
     mu: float,
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
@@ -39,7 +39,7 @@ def penalty_impulses(
         u = relative_velocity(at, v)
         p = float(0.0)
         if to.inv_mass_turning > 0.0 and at.depth > 0.0:
-            p = dt[0] * wp.max(stiffness * at.depth - damping * wp.dot(u, at.normal), 0.0)
+            p = dt[at.vert[0]] * wp.max(stiffness * at.depth - damping * wp.dot(u, at.normal), 0.0)
         given = with_friction(p, at.normal, u, mu, to)
         for k in range(5):
             part[5 * c + k] = part_of(k, at, to, given.normal * at.normal + given.friction)

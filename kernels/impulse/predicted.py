@@ -28,7 +28,7 @@ def predicted_impulses(
     # in
     threads: int,
     mu: float,
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
@@ -45,7 +45,7 @@ def predicted_impulses(
         p = float(0.0)
         if to.inv_mass > 0.0:
             g = gap(at, x)
-            p = wp.max(-g, 0.0) / (dt[0] * to.inv_mass)
+            p = wp.max(-g, 0.0) / (dt[at.vert[0]] * to.inv_mass)
         given = with_friction(p, at.normal, relative_velocity(at, v), mu, to)
         for k in range(5):
             part[5 * c + k] = part_of(k, at, to, given.normal * at.normal + given.friction)

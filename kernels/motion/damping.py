@@ -48,7 +48,7 @@ def load(
     f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N], elastic forces
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
     gravity: wp.vec3,  # [m/s^2]
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     last: wp.array[wp.vec3],  # (n_vert,) [m/s] change by contacts in the last step
     before: wp.array[wp.vec3],  # (n_vert,) [m/s] in the one before it
     # out
@@ -59,7 +59,7 @@ def load(
     b[i] = wp.vec3(0.0, 0.0, 0.0)
     if inv_mass[i] > 0.0:
         a = inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet) + gravity
-        b[i] = dt[0] * a + expected(last[i], before[i])
+        b[i] = dt[i] * a + expected(last[i], before[i])
 
 
 @wp.kernel
@@ -69,8 +69,9 @@ def begin(
     vt_corner: wp.array[int],  # (4 n_tet,)
     f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N], C v
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
-    dt: wp.array[float],  # (1,) [s]
-    coef: wp.array[float],  # (MOST,)
+    dt: wp.array[float],  # (n_vert,) [s]
+    row: wp.array[int],  # (n_vert,) world
+    coef: wp.array2d[float],  # (n_world, MOST)
     # in, out
     r: wp.array[wp.vec3],  # (n_vert,) [m/s] b, then r_0
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
@@ -78,9 +79,9 @@ def begin(
     """One thread per vertex: the first term of the sum."""
     i = wp.tid()
     if inv_mass[i] > 0.0:
-        u = r[i] - dt[0] * inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet)
+        u = r[i] - dt[i] * inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet)
         r[i] = u
-        v[i] = v[i] + coef[0] * u
+        v[i] = v[i] + coef[row[i], 0] * u
 
 
 @wp.kernel
@@ -91,9 +92,10 @@ def go_on(
     vt_corner: wp.array[int],  # (4 n_tet,)
     f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N], C r_{k-1}
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
-    dt: wp.array[float],  # (1,) [s]
-    reach: wp.array[float],  # (1,) Z
-    coef: wp.array[float],  # (MOST,)
+    dt: wp.array[float],  # (n_vert,) [s]
+    row: wp.array[int],  # (n_vert,) world
+    reach: wp.array[float],  # (n_world,) Z
+    coef: wp.array2d[float],  # (n_world, MOST)
     last: wp.array[wp.vec3],  # (n_vert,) [m/s] r_{k-1}
     # in, out
     r: wp.array[wp.vec3],  # (n_vert,) [m/s] r_{k-2}, then r_k
@@ -102,18 +104,18 @@ def go_on(
     """One thread per vertex: term k of the sum, from 1 on."""
     i = wp.tid()
     if inv_mass[i] > 0.0:
-        lr = dt[0] * inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet)
-        u = last[i] - 2.0 / reach[0] * lr
+        lr = dt[i] * inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet)
+        u = last[i] - 2.0 / reach[row[i]] * lr
         if k > 1:
             u = 2.0 * u - r[i]
         r[i] = u
-        v[i] = v[i] + coef[k] * u
+        v[i] = v[i] + coef[row[i], k] * u
 
 
 @wp.kernel
 def finish(
     # in
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     last: wp.array[wp.vec3],  # (n_vert,) [m/s] change by contacts in the last step
     before: wp.array[wp.vec3],  # (n_vert,) [m/s] in the one before it
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
@@ -131,7 +133,7 @@ def finish(
         u -= expected(last[i], before[i])
     v[i] = u
     free[i] = u
-    x_new[i] = x[i] + dt[0] * u
+    x_new[i] = x[i] + dt[i] * u
 
 
 @wp.kernel
@@ -152,12 +154,12 @@ def remember(
 @wp.kernel
 def scale(
     # in
-    by: float,
+    by: wp.array[float],  # (n_vert,)
     # in, out
     last: wp.array[wp.vec3],  # (n_vert,) [m/s]
     before: wp.array[wp.vec3],  # (n_vert,) [m/s]
 ):
     """One thread per vertex: what is expected of a step of another length."""
     i = wp.tid()
-    last[i] = by * last[i]
-    before[i] = by * before[i]
+    last[i] = by[i] * last[i]
+    before[i] = by[i] * before[i]

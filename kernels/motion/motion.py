@@ -47,7 +47,7 @@ def kick(
     f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
     gravity: wp.vec3,  # [m/s^2]
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
@@ -56,7 +56,7 @@ def kick(
 ):
     """One thread per vertex: kick by the forces and drift; fixed vertices keep their velocity."""
     i = wp.tid()
-    h = dt[0]
+    h = dt[i]
     u = v[i]
     if inv_mass[i] > 0.0:
         u += h * (inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet) + gravity)
@@ -67,7 +67,7 @@ def kick(
 @wp.kernel
 def advance(
     # in
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
@@ -75,7 +75,7 @@ def advance(
 ):
     """One thread per vertex: drift."""
     i = wp.tid()
-    x_new[i] = x[i] + dt[0] * v[i]
+    x_new[i] = x[i] + dt[i] * v[i]
 
 
 @wp.kernel

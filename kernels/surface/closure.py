@@ -40,7 +40,7 @@ def begin_closure(
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     residual: wp.array[float],  # (capacity,) [m]
     # out
     slack: wp.array[float],  # (capacity,) [m]
@@ -52,7 +52,7 @@ def begin_closure(
         slack[c] = 0.0
         if residual[c] > 0.0:
             slack[c] = wp.max(residual[c] - bound * edge, 0.0) - REST_GAP * edge
-        if -constraint[c].gap_bound * dt[0] > deep * edge:
+        if -constraint[c].gap_bound * dt[contact[c].vert[0]] > deep * edge:
             slack[c] = NONE
         push[c] = 0.0
 

@@ -30,7 +30,7 @@ def residual_gaps(
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
-    dt: wp.array[float],  # (1,) [s]
+    dt: wp.array[float],  # (n_vert,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     residual: wp.array[float],  # (capacity,) [m], 0 up to the tolerance
@@ -48,7 +48,8 @@ def residual_gaps(
         if d > CLOSURE_TOLERANCE * edge:
             residual[c] = d
             found[OPEN] = 1
-        if d > OLD_OVERLAP * edge and -constraint[c].gap_bound * dt[0] > OLD_OVERLAP * edge:
+        old = -constraint[c].gap_bound * dt[at.vert[0]]
+        if d > OLD_OVERLAP * edge and old > OLD_OVERLAP * edge:
             found[OLD] = 1
             found[WAS_OLD] = 1
 

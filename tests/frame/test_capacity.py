@@ -167,9 +167,10 @@ def test_buffers_that_grow_on_the_way_change_nothing(pile):
             damping.copy(tight._stepper.work.damping, expected)
         for sim in (tight, ample):
             # Short steps, which lengthen by a part from frame to frame, not from try to try.
-            sim._stepper.last = replace(sim._stepper.last, n=max(sim.substeps, 40))
+            sim._stepper.last = replace(sim._stepper.last, n=np.array([max(sim.substeps, 40)]))
             sim.step_frame()
         assert tight.substeps == ample.substeps
+        assert (tight._stepper.last.rates == ample._stepper.last.rates).all()
         np.testing.assert_array_equal(tight.positions(), ample.positions())
         np.testing.assert_array_equal(tight.velocities(), ample.velocities())
         if shrunk >= 0 and frame >= shrunk + 3:

@@ -144,13 +144,18 @@ def test_positions_that_are_not_finite_give_infinity_and_leave_no_trace(blob, bu
     assert spectrum.omega(y) == Spectrum(model).omega(y)
 
 
+def rates_of(spectrum: Spectrum, x: wp.array) -> tuple[float, float]:
+    """Those of the one world that there is."""
+    return tuple(spectrum.rates(x)[:, 0].tolist())
+
+
 def test_rates_are_found_again_when_a_shape_that_matters_has_changed(blob, build_model):
     x, tets = blob((4, 3, 2))
     soft = NeoHookean(0.01 * MATERIALS[0].youngs_modulus, 0.3, 1000.0)
     model = build_model((x, tets, MATERIALS[0]), (x, tets, soft), fixed=[0, 1, 2])
     spectrum, n = Spectrum(model), len(x)
     x = np.concatenate([x, x])
-    rates = spectrum.rates(wp.array(x, dtype=wp.vec3))
+    rates = rates_of(spectrum, wp.array(x, dtype=wp.vec3))
     assert min(rates) >= 0.0 and rates[0] > 0.0
 
     turned = x[:, [1, 2, 0]] + 5.0
@@ -161,17 +166,17 @@ def test_rates_are_found_again_when_a_shape_that_matters_has_changed(blob, build
     calls = []
     bounds = spectrum._bounds
     spectrum._bounds = lambda *args: calls.append(args) or bounds(*args)
-    assert spectrum.rates(wp.array(turned, dtype=wp.vec3)) == rates
-    assert spectrum.rates(wp.array(little, dtype=wp.vec3)) == rates
+    assert rates_of(spectrum, wp.array(turned, dtype=wp.vec3)) == rates
+    assert rates_of(spectrum, wp.array(little, dtype=wp.vec3)) == rates
     assert not calls
-    spectrum.rates(wp.array(much, dtype=wp.vec3))
+    rates_of(spectrum, wp.array(much, dtype=wp.vec3))
     assert calls
     spectrum._bounds = bounds
     squeezed = wp.array(x * [1.0, 1.0, 0.5], dtype=wp.vec3)
-    found, fresh = spectrum.rates(squeezed)[0], Spectrum(model).omega(squeezed)
+    found, fresh = rates_of(spectrum, squeezed)[0], Spectrum(model).omega(squeezed)
     # Two short restarts right after a sudden change of shape: 0.93 to 1.07 times in 100 draws.
     assert found == pytest.approx(fresh, rel=0.15) and found != rates[0]
-    assert spectrum.rates(wp.full(len(x), np.nan, dtype=wp.vec3))[0] == np.inf
+    assert rates_of(spectrum, wp.full(len(x), np.nan, dtype=wp.vec3))[0] == np.inf
 
 
 def test_rates_that_are_kept_are_right_to_some_percent(blob, build_model):
@@ -181,7 +186,7 @@ def test_rates_that_are_kept_are_right_to_some_percent(blob, build_model):
     spectrum = Spectrum(model)
     for part in np.geomspace(0.4, 0.06, 120):
         y = wp.array(x * [1.0, 1.0, part], dtype=wp.vec3)
-        found = spectrum.rates(y)
+        found = rates_of(spectrum, y)
         fresh = Spectrum(model)
         # 0.4 % too low at worst in ten draws of 250 looks; 40 % with a change of a tenth.
         assert found[0] > 0.97 * fresh.omega(y) and found[1] > 0.97 * fresh.damping_rate(y)
@@ -194,11 +199,11 @@ def test_a_crushed_soft_body_beside_a_stiff_one_is_seen(box, height, build_model
     model = build_model((x, tets, stiff), (x, tets, soft))
     spectrum, n = Spectrum(model), len(x)
     x = np.concatenate([x, x])
-    spectrum.rates(wp.array(x, dtype=wp.vec3))
+    rates_of(spectrum, wp.array(x, dtype=wp.vec3))
     for part in np.linspace(1.0, height, 9)[1:]:
         x[n:, 2] = part * x[:n, 2]
         y = wp.array(x, dtype=wp.vec3)
-        omega = spectrum.rates(y)[0]
+        omega = rates_of(spectrum, y)[0]
     # Rates of a little while ago: some percent too low at most, where the steps keep two fifths.
     assert omega > 0.95 * Spectrum(model).omega(y)
 
@@ -207,10 +212,10 @@ def test_a_sliver_that_is_flattened_is_seen(build_model):
     x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, 0.3, 0.1]])
     model = build_model((x, np.array([[0, 1, 2, 3]]), NeoHookean(1e5, 0.3, 1000.0)))
     spectrum = Spectrum(model)
-    spectrum.rates(wp.array(x, dtype=wp.vec3))
+    rates_of(spectrum, wp.array(x, dtype=wp.vec3))
     x[3, 2] = 0.02
     y = wp.array(x, dtype=wp.vec3)
-    assert spectrum.rates(y)[0] == pytest.approx(Spectrum(model).omega(y), rel=CLOSE)
+    assert rates_of(spectrum, y)[0] == pytest.approx(Spectrum(model).omega(y), rel=CLOSE)
 
 
 @pytest.mark.parametrize("volume", [-0.5, 0.0, 0.249, 0.251, 3.0])
@@ -222,15 +227,15 @@ def test_rates_may_rise_where_tets_are_flat_however_they_lie(volume, blob, build
     turn *= np.sign(np.linalg.det(turn))
     y = (x @ turn.T) @ np.diag([1.0, 2.0, volume / 2.0]) + [3.0, 0.0, 0.0]
     for at, flat in ((x, False), (y, volume < 0.25), (x, False)):
-        spectrum.rates(wp.array(at, dtype=wp.vec3))
+        rates_of(spectrum, wp.array(at, dtype=wp.vec3))
         assert spectrum.flat == flat
 
 
 def test_rates_without_bound_are_not_kept(blob, build_model):
     x, tets = blob((2, 1, 1))
     spectrum = Spectrum(build_model((x, tets, MATERIALS[0])))
-    assert spectrum.rates(wp.array(1e30 * x, dtype=wp.vec3))[0] == np.inf
-    assert np.isfinite(spectrum.rates(wp.array(x, dtype=wp.vec3))[0])
+    assert rates_of(spectrum, wp.array(1e30 * x, dtype=wp.vec3))[0] == np.inf
+    assert np.isfinite(rates_of(spectrum, wp.array(x, dtype=wp.vec3))[0])
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-3, 1e-5, 1e-6])

@@ -83,10 +83,12 @@ class _Window:
     def __init__(self, sim: Simulation, steps: int):
         stepper = sim._stepper
         self._steps, self._work, self._device = steps, stepper.work, sim.device
-        self._work.dt.fill_(stepper.last.dt)
+        self._work.dt.assign(stepper.last_dt)
         self._work.overflow.all.zero_()
         self.step = step_of(sim.response, bool(stepper.last.overlapping))
-        stages = prepare(self._work.damping, stepper.last.rates[1], stepper.last.dt)
+        last = stepper.last
+        given = last.rates[1], last.dt, stepper.worlds.of_vert, last.dt
+        stages = prepare(self._work.damping, *given)
         self._arguments = sim.model, sim.state, self._work, stages
         self._start = [(a, wp.clone(a)) for a in arrays((sim.state, self._work)) if a.size]
         self.contacts: list[int] = []

@@ -15,15 +15,17 @@ class Damping:
     """Only of scenes with a damped body.
 
     Attributes:
-        coef: coefficients of the polynomial [-], shape (MOST,)
-        reach: largest step times eigenvalue that it is good for [-], shape (1,)
+        row: number of the world of each vertex, shape (n_vert,)
+        coef: coefficients of the polynomial of each world [-], shape (n_world, MOST)
+        reach: largest step times eigenvalue that it is good for [-], shape (n_world,)
         last: change of the velocities by contacts in the last step [m/s], shape (n_vert,)
         before: the same in the step before it [m/s], shape (n_vert,)
         free: velocities in this step before the contacts [m/s], shape (n_vert,)
         even, odd: terms of the polynomial [m/s], shape (n_vert,)
     """
 
-    coef: wp.array[float]
+    row: wp.array[int]
+    coef: wp.array2d[float]
     reach: wp.array[float]
     last: wp.array[wp.vec3]
     before: wp.array[wp.vec3]
@@ -33,11 +35,19 @@ class Damping:
 
 
 def allocate(model: Model) -> Damping | None:
-    """Allocate before any step; None where no body is damped."""
+    """Allocate before any step, for one world; None where no body is damped."""
     if not any(e.damped for e in model.elements):
         return None
     vectors = [wp.zeros(model.n_vert, dtype=wp.vec3) for _ in range(5)]
-    return Damping(wp.zeros(MOST, dtype=float), wp.ones(1, dtype=float), *vectors)
+    row = wp.zeros(model.n_vert, dtype=int)
+    return Damping(row, wp.zeros((1, MOST), dtype=float), wp.ones(1, dtype=float), *vectors)
+
+
+def divide(d: Damping | None, of_vert: np.ndarray, n_world: int) -> None:
+    """Let each world have a polynomial of its own; ``of_vert`` are their numbers, (n_vert,)."""
+    if d:
+        d.row.assign(of_vert.astype(np.int32))
+        d.coef, d.reach = wp.zeros((n_world, MOST), dtype=float), wp.ones(n_world, dtype=float)
 
 
 def copied(d: Damping | None) -> tuple[wp.array, ...]:
@@ -64,6 +74,15 @@ def forget(d: Damping | None, vertices: slice = slice(None)) -> None:
     if d:
         d.last[vertices].zero_()
         d.before[vertices].zero_()
+
+
+def recall(d: Damping | None, of: tuple[wp.array, ...], verts: np.ndarray) -> None:
+    """Put what was ``copied`` back at some vertices, a mask."""
+    if d:
+        for array, kept in zip((d.last, d.before), of, strict=True):
+            mine = array.numpy().copy()
+            mine[verts] = kept.numpy()[verts]
+            array.assign(mine)
 
 
 def values(d: Damping | None) -> dict[str, np.ndarray]:

@@ -58,6 +58,30 @@ def copy(to: WarmStart, of: WarmStart) -> None:
     wp.copy(to.edges, of.edges, count=min(len(to.edges), len(of.edges)))
 
 
+def recall(
+    to: WarmStart, of: WarmStart, verts: np.ndarray, edges: np.ndarray, needed: wp.array
+) -> None:
+    """Put the impulses of vertices and edges, masks, back from another one; all of others stay.
+
+    Where the contacts of edges do not fit, ``needed`` says how many there are.
+    """
+    for array, kept in ((to.partner, of.partner), (to.kept, of.kept)):
+        mine, theirs = array.numpy().copy(), kept.numpy()
+        mine[verts] = theirs[verts]
+        array.assign(mine)
+    mine, theirs = (w.edges.numpy()[: int(w.n_edge.numpy()[0])] for w in (to, of))
+    theirs = theirs[edges[theirs["edge"]]]
+    both = np.empty(len(mine) + len(theirs), dtype=mine.dtype)
+    both[: len(mine)], both[len(mine) :] = mine, theirs
+    both = both[np.lexsort((both["body"], both["edge"]))]
+    if len(both) > len(to.edges):
+        needed.fill_(len(both))
+        return
+    to.n_edge.fill_(len(both))
+    if len(both):
+        wp.copy(to.edges, wp.array(both, dtype=EdgeContact), count=len(both))
+
+
 def values(warm: WarmStart) -> dict[str, np.ndarray]:
     """What a checkpoint needs of it."""
     n = int(warm.n_edge.numpy()[0])

@@ -30,7 +30,7 @@ class Work:
     Attributes:
         capacity: of the lists
         overflow: what did not fit
-        dt: the step [s], shape (1,)
+        dt: the step of each vertex, that of its world [s], shape (n_vert,)
         steps: how many the frame still has, shape (1,)
         awake: what moves
         mesh: what the search for contacts reads of the model
@@ -99,7 +99,7 @@ def allocate_work(
     return Work(
         capacity=capacity,
         overflow=overflow.allocate(),
-        dt=wp.zeros(1, dtype=float),
+        dt=wp.zeros(n, dtype=float),
         steps=wp.zeros(1, dtype=int),
         awake=awake or everything(model),
         mesh=mesh_of(model, broad.surface),

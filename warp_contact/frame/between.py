@@ -6,26 +6,28 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work, everything
-from warp_contact.frame.last_frame import LastFrame
 from warp_contact.step.velocity import shift_velocities
 
 
 def set_velocities(
-    model: Model, state: State, work: Work, last: LastFrame, values: np.ndarray, at: np.ndarray
+    model: Model, state: State, work: Work, dt: np.ndarray, values: np.ndarray, at: np.ndarray
 ) -> None:
-    """Set velocities ``values`` [m/s] at that time, shape (k, 3), of the vertices ``at`` (k,)."""
+    """Set velocities ``values`` [m/s] at that time, shape (k, 3), of the vertices ``at`` (k,).
+
+    ``dt`` is the last step of each vertex [s], shape (n_vert,).
+    """
     gained = State(state.x, wp.zeros(model.n_vert, dtype=wp.vec3))
-    shift_velocities(model, gained, work, everything(model), -0.5 * last.dt)
+    shift_velocities(model, gained, work, everything(model), -0.5 * dt)
     v = state.v.numpy().copy()
     v[at] = values + gained.v.numpy()[at]
     state.v.assign(v)
 
 
 def set_positions(
-    model: Model, state: State, work: Work, last: LastFrame, x: np.ndarray, v: np.ndarray
+    model: Model, state: State, work: Work, dt: np.ndarray, x: np.ndarray, v: np.ndarray
 ) -> None:
     """Set positions ``x`` [m] where velocities at that time are ``v`` [m/s]; all (n_vert, 3)."""
     body = model.vert_body.numpy()
     moved = np.isin(body, body[(x != state.x.numpy()).any(axis=1)])
     state.x.assign(x)
-    set_velocities(model, state, work, last, v[moved], np.flatnonzero(moved))
+    set_velocities(model, state, work, dt, v[moved], np.flatnonzero(moved))

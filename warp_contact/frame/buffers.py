@@ -3,10 +3,12 @@
 import numpy as np
 import warp as wp
 
+from warp_contact.data import damping
 from warp_contact.data.model import Model
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work, allocate_work
+from warp_contact.frame.worlds import Worlds
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
@@ -29,8 +31,10 @@ class Buffers:
         state: State,
         response: ContactSurface | Penalty | PredictedForce,
         awake: Awake | None,
+        worlds: Worlds,
     ):
         """Allocate on the current device; ``awake`` is what moves, None for everything."""
+        self._worlds = worlds
         self._model, self._state, self._awake = model, state, awake
         self.response = response
         inv_mass = model.inv_mass.numpy()
@@ -73,4 +77,6 @@ class Buffers:
         return self._graphs[key]
 
     def _allocate(self, capacity: Capacity) -> Work:
-        return allocate_work(self._model, self._state, capacity, self._awake, self.unit)
+        work = allocate_work(self._model, self._state, capacity, self._awake, self.unit)
+        damping.divide(work.damping, self._worlds.of_vert, self._worlds.n)
+        return work

@@ -10,9 +10,11 @@ import math
 from functools import lru_cache
 
 import numpy as np
+import warp as wp
 from numpy.polynomial.chebyshev import chebvander
 
 from warp_contact.data.damping import MOST, Damping
+from warp_contact.step.damping import scale_contacts
 
 RATE_MARGIN = 1.1  # on the damping rate, which is estimated and grows within a frame
 NEAR, FADED = 0.05, 0.01
@@ -21,29 +23,47 @@ FEW = 0.04, 0.75  # reach of one stage, and of two
 LADDER = 1.02  # between two values of the reach, so that few polynomials are fitted
 
 
-def reach_for(rate: float, dt: float) -> float:
-    """Largest step times eigenvalue [-] to serve, for a ``rate`` [1/s] and a step ``dt`` [s]."""
-    z = RATE_MARGIN * rate * dt
-    for least in FEW:
-        if z <= least:
-            return least
-    return LADDER ** math.ceil(math.log(z) / math.log(LADDER) - 1e-9)
+def reach_for(rate, dt):
+    """Largest step times eigenvalue [-] to serve, for a ``rate`` [1/s] and a step ``dt`` [s].
+
+    Both may be arrays.
+    """
+    z = RATE_MARGIN * np.asarray(rate) * dt
+    power = np.ceil(np.log(np.maximum(z, FEW[1])) / math.log(LADDER) - 1e-9)
+    return np.where(z <= FEW[0], FEW[0], np.where(z <= FEW[1], FEW[1], LADDER**power))
 
 
-def stages_for(rate: float, dt: float) -> int:
-    """Return how often a step ``dt`` [s] applies the damping, of which ``rate`` [1/s] is most."""
-    reach = reach_for(rate, dt)
-    return 1 if reach == FEW[0] else math.ceil(STAGES * math.sqrt(reach) - 1e-9)
+def stages_for(rate, dt) -> int:
+    """Return how often steps ``dt`` [s] apply the damping, of which ``rate`` [1/s] is most."""
+    return _stages(float(np.max(reach_for(rate, dt))))
 
 
-def prepare(d: Damping | None, rate: float, dt: float) -> int:
-    """Fill the polynomial of steps ``dt`` [s] in for a ``rate`` [1/s]; return their stages."""
+def prepare(
+    d: Damping | None, rate: np.ndarray, dt: np.ndarray, of_vert: np.ndarray, last: np.ndarray
+) -> int:
+    """Fill the polynomials of worlds in, and return the stages of a step.
+
+    Args:
+        d: what to fill
+        rate: largest damping rate of each world [1/s], shape (n_world,)
+        dt: their steps [s], shape (n_world,)
+        of_vert: number of the world of each vertex, shape (n_vert,)
+        last: the steps before [s], 0 before the first, shape (n_world,)
+    """
     if d is None:
         return 0
-    stages, reach = stages_for(rate, dt), reach_for(rate, dt)
-    d.coef.assign(coefficients(reach, stages))
-    d.reach.fill_(reach)
-    return stages
+    if last.any() and (last != dt).any():
+        by = np.where(last > 0.0, dt / np.where(last > 0.0, last, 1.0), 1.0)
+        scale_contacts(d, wp.array(by[of_vert].astype(np.float32), dtype=float))
+    reach, row = np.unique(np.atleast_1d(reach_for(rate, dt)), return_inverse=True)
+    coef = np.stack([coefficients(float(r), _stages(float(r))) for r in reach])
+    d.coef.assign(coef[row])
+    d.reach.assign(reach[row].astype(np.float32))
+    return stages_for(rate, dt)
+
+
+def _stages(reach: float) -> int:
+    return 1 if reach <= FEW[0] else math.ceil(STAGES * math.sqrt(reach) - 1e-9)
 
 
 @lru_cache(maxsize=256)

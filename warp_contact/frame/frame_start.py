@@ -1,5 +1,6 @@
 """What a frame changes on the device, as it was when the frame began."""
 
+import numpy as np
 import warp as wp
 
 from warp_contact.data import contact_forces, damping, warm_start
@@ -38,6 +39,11 @@ class FrameStart:
         warm_start.copy(work.warm, self._warm)
         damping.copy(work.damping, self._damping)
         work.broad_phase.stale.fill_(1)
+
+    def recall(self, work: Work, verts: np.ndarray, edges: np.ndarray) -> None:
+        """Restore what vertices and edges, masks, take over from the last frame."""
+        warm_start.recall(work.warm, self._warm, verts, edges, work.overflow.contacts)
+        damping.recall(work.damping, self._damping, verts)
 
     def undo(self, state: State, work: Work) -> None:
         """Restore all, as if the frame had not begun."""

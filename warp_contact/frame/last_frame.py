@@ -5,21 +5,22 @@ from dataclasses import dataclass
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LastFrame:
-    """Numbers of the last frame.
+    """Numbers of the last frame, one for each world where they are arrays.
 
     Attributes:
-        n: its steps, 0 before the first
+        n: steps, 0 before the first frame, shape (n_world,)
         dt: their length [s], 0 before the first; the velocities of symplectic Euler are those of
-            half of it before the positions
-        rates: largest elastic frequency and damping rate at its end [1/s], None if to be found
+            half of it before the positions, shape (n_world,)
+        rates: largest elastic frequency and damping rate at its end [1/s], None if to be found,
+            shape (2, n_world)
         overlapping: whether there may be overlaps that no step created, None if to be found
     """
 
-    n: int = 0
-    dt: float = 0.0
-    rates: tuple[float, float] | None = None
+    n: np.ndarray
+    dt: np.ndarray
+    rates: np.ndarray | None = None
     overlapping: bool | None = None
 
     def values(self) -> dict[str, np.ndarray]:
@@ -27,11 +28,12 @@ class LastFrame:
         return {k: np.array(value) for k, value in vars(self).items() if value is not None}
 
 
+def none_yet(n_world: int) -> LastFrame:
+    """Before the first frame."""
+    return LastFrame(np.zeros(n_world, dtype=int), np.zeros(n_world))
+
+
 def last_frame_of(values: dict[str, np.ndarray]) -> LastFrame:
     """The instance that gave these ``values``."""
-    return LastFrame(
-        n=int(values["n"]),
-        dt=float(values["dt"]),
-        rates=tuple(map(float, values["rates"])) if "rates" in values else None,
-        overlapping=bool(values["overlapping"]) if "overlapping" in values else None,
-    )
+    overlapping = bool(values["overlapping"]) if "overlapping" in values else None
+    return LastFrame(values["n"], values["dt"], values.get("rates"), overlapping)

@@ -1,7 +1,5 @@
 """The rates that limit the step, at the end of a frame, or what is wrong with its state."""
 
-import math
-
 import numpy as np
 
 from warp_contact.data.model import Model
@@ -9,11 +7,11 @@ from warp_contact.data.state import State
 from warp_contact.frame.diagnosis import flattest_tet, lost_vertex, vertex_name
 from warp_contact.frame.spectrum import Spectrum
 
-NO_RATES = math.inf, math.inf  # of a state that is lost
+NO_RATES = np.full((2, 1), np.inf)  # of a state that is lost
 
 
-def rates_now(model: Model, state: State, spectrum: Spectrum) -> tuple[tuple[float, float], str]:
-    """Rates of the present state [1/s], and what is wrong with it: empty where nothing is."""
+def rates_now(model: Model, state: State, spectrum: Spectrum) -> tuple[np.ndarray, str]:
+    """Rates of the present state [1/s], (2, n_world), and what is wrong with it, or nothing."""
     lost = lost_vertex(state)
     if lost is not None:
         return NO_RATES, f"{vertex_name(model, lost)} is no longer finite"

@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 
 from warp_contact.data.model import Model
+from warp_contact.frame.worlds import Worlds
 from warp_contact.kernels.elastic import neo_hookean, shape
 from warp_contact.kernels.motion import lanczos
 from warp_contact.step import forces
@@ -42,9 +43,12 @@ class Spectrum:
             many times in a few steps
     """
 
-    def __init__(self, model: Model) -> None:
-        """Allocate about 160 bytes per vertex and 84 per tet on the current device."""
-        self._model = model
+    def __init__(self, model: Model, worlds: Worlds | None = None) -> None:
+        """Allocate about 160 bytes per vertex and 84 per tet on the current device.
+
+        ``worlds`` are those that do not depend on each other; without them all bodies are one.
+        """
+        self._model, self._worlds = model, worlds or Worlds(model, apart=False)
         chunk, body_chunk = _chunks(model.body_vert.numpy())
         self._chunk = wp.array(chunk, dtype=int)
         self._body_chunk = wp.array(body_chunk, dtype=int)
@@ -64,21 +68,25 @@ class Spectrum:
         self._at: np.ndarray | None = None
         self._of_bodies = np.zeros((2, model.n_body))
 
-    def rates(self, x: wp.array) -> tuple[float, float]:
-        """``omega`` and ``damping_rate``, or those of an earlier call while shapes are close to it.
+    def rates(self, x: wp.array) -> np.ndarray:
+        """Rates [1/s] of each world at ``x`` [m], or those kept while its shapes are close to them.
 
-        Rigid motion changes no rate. A body whose own rates are far below the largest may change
-        its shape by more than the others until they are found again.
+        Shape (2, n_world): the largest elastic frequency and damping rate. Rigid motion changes no
+        rate. A body whose own rates are far below the largest of its world may change its shape by
+        more than the others until they are found again.
         """
         change, flat = self._changes(x)
         self.flat = bool(flat.any())
-        if self._at is None or not self._close(change):
-            self._at = x.numpy().copy()
-            self._remember(x)
-            squares = self._bounds(forces.apply_stiffness, x)
-            self._of_bodies = np.array([squares**0.5, self._damping_rates(x)])
-        omega, rate = self._of_bodies.max(axis=1).tolist()
-        return omega, rate
+        stale = np.ones(self._worlds.n, dtype=bool) if self._at is None else self._stale(change)
+        if stale.any():
+            own = stale[self._worlds.of_vert, None]
+            at = x.numpy().copy()
+            self._at = at if self._at is None else np.where(own, at, self._at)
+            self._remember(wp.array(self._at, dtype=wp.vec3))
+            squares = self._bounds(forces.apply_stiffness, x, stale)
+            found = squares**0.5, self._damping_rates(x, stale)
+            self._of_bodies = np.where(stale[self._worlds.of_body], found, self._of_bodies)
+        return self._worlds.most(self._of_bodies)
 
     def _remember(self, x: wp.array) -> None:
         """Keep the shapes at ``x`` [m]."""
@@ -93,22 +101,18 @@ class Spectrum:
         wp.launch(shape.changes, dim=m.n_tet, inputs=inputs, outputs=[self._change])
         return self._change.numpy()
 
-    def _close(self, change: np.ndarray) -> bool:
-        """Whether the rates at the shapes kept suffice after such changes, shape (n_body,)."""
-        most = self._of_bodies.max(axis=1, keepdims=True)
-        slow = (self._of_bodies * [[SLOWER], [SLOWER**2]] <= most).all(axis=0)
-        allowed = np.where(slow, MUCH, LITTLE)
-        return bool(np.isfinite(most).all() and (change <= allowed).all())
+    def _stale(self, change: np.ndarray) -> np.ndarray:
+        """Worlds whose rates do not suffice after such changes of bodies, shape (n_body,)."""
+        worlds = self._worlds
+        most = worlds.most(self._of_bodies)
+        slow = (self._of_bodies * [[SLOWER], [SLOWER**2]] <= most[:, worlds.of_body]).all(axis=0)
+        late = ~(change <= np.where(slow, MUCH, LITTLE))
+        return ~np.isfinite(most).all(axis=0) | (worlds.most(late.astype(float)) > 0.0)
 
     @property
-    def stiffest(self) -> int:
-        """The body with the largest frequency, where ``rates`` were last asked for."""
-        return int(self._of_bodies[0].argmax())
-
-    @property
-    def most_damped(self) -> int:
-        """The body with the largest damping rate, there."""
-        return int(self._of_bodies[1].argmax())
+    def of_bodies(self) -> np.ndarray:
+        """Rates of each body [1/s], where ``rates`` were last asked for, shape (2, n_body)."""
+        return self._of_bodies
 
     def omega(self, x: wp.array) -> float:
         """Angular frequency [1/s] of the fastest mode at the positions ``x`` [m].
@@ -122,14 +126,14 @@ class Spectrum:
         """Largest eigenvalue [1/s] of M^-1 C at the positions ``x`` [m]; 0 without damping."""
         return float(self._damping_rates(x).max())
 
-    def save(self) -> None:
-        """Keep what ``rates`` changes."""
+    def memory(self) -> tuple:
+        """What ``rates`` changes, as it is now."""
         starts = {apply: wp.clone(start) for apply, start in self._start.items()}
-        self._saved = starts, self._at, self._of_bodies, self.flat
+        return starts, self._at, self._of_bodies, self.flat
 
-    def undo(self) -> None:
-        """Put back what was kept."""
-        self._start, self._at, self._of_bodies, self.flat = self._saved
+    def remind(self, memory: tuple) -> None:
+        """Put back what was kept in the ``memory``, which is used up."""
+        self._start, self._at, self._of_bodies, self.flat = memory
         if self._at is not None:
             self._remember(wp.array(self._at, dtype=wp.vec3))
 
@@ -154,17 +158,23 @@ class Spectrum:
         self._of_bodies = starts.get("of_bodies", self._of_bodies)
         self.flat = bool(starts.get("flat", False))
 
-    def _damping_rates(self, x: wp.array) -> np.ndarray:
-        """Bounds on the eigenvalues [1/s] of M^-1 C of each body, shape (n_body,)."""
+    def _damping_rates(self, x: wp.array, of: np.ndarray | None = None) -> np.ndarray:
+        """Bounds on the eigenvalues [1/s] of M^-1 C of each body, as ``_bounds``."""
         damped = [e.damped for e in self._model.elements]
         if not any(damped):
             return np.zeros(self._model.n_body)
         if not all(damped):
             self._f_tet.zero_()
-        return self._bounds(forces.apply_damping, x)
+        return self._bounds(forces.apply_damping, x, of)
 
-    def _bounds(self, apply: Callable, x: wp.array) -> np.ndarray:
-        """Bounds on the eigenvalues of each body, shape (n_body,)."""
+    def _bounds(self, apply: Callable, x: wp.array, of: np.ndarray | None = None) -> np.ndarray:
+        """Bounds on the eigenvalues of each body, shape (n_body,).
+
+        Only those of the worlds ``of`` count, shape (n_world,), all without it. Each world ends
+        where it has converged, whatever the others do.
+        """
+        worlds = self._worlds
+        going = np.ones(worlds.n, dtype=bool) if of is None else of.copy()
         wp.copy(self._x, x)
         first = apply not in self._start
         if first:
@@ -172,7 +182,7 @@ class Spectrum:
         wp.copy(self._basis[0], self._start[apply])
         fewest, most = FIRST if first else LATER
         depth = DEPTH if first else SHORT
-        bound = np.zeros(self._model.n_body)
+        out, start = np.zeros(self._model.n_body), None
         for cycle in range(most):
             self._cycle(apply, depth)
             coef = self._coef.numpy()[: 2 * depth + 1]
@@ -182,10 +192,21 @@ class Spectrum:
             theta, residual, ritz = _ritz_pairs(coef)
             self._restart(ritz)
             bound = theta + residual
-            if cycle + 1 >= fewest and bound.max() <= (1.0 + CONVERGED) * theta.max():
+            done = worlds.most(bound) <= (1.0 + CONVERGED) * worlds.most(theta)
+            ended = going & (done if cycle + 1 >= fewest else False)
+            ended = going if cycle + 1 == most else ended
+            out = np.where(ended[worlds.of_body], bound, out)
+            if ended.all():  # the usual case: one world, or all at once
+                wp.copy(self._start[apply], self._basis[0])
+                return out
+            if ended.any():
+                start = self._start[apply].numpy() if start is None else start
+                start = np.where(ended[worlds.of_vert, None], self._basis[0].numpy(), start)
+            going &= ~ended
+            if not going.any():
                 break
-        wp.copy(self._start[apply], self._basis[0])
-        return bound
+        self._start[apply].assign(start)
+        return out
 
     def _restart(self, ritz: np.ndarray) -> None:
         """Set row 0 of the basis to a sum of its rows for each body, plus noise."""

@@ -5,14 +5,14 @@
     gentle  = min(u / (TRAVEL e), PATIENCE stable)   [1/s]  an impact does not crush a tet at once
     n       = max(ceil(max(stable, passing, gentle) / fps), floor(KEEP n_last), 1)
 
-omega is the largest frequency of the elastic forces [1/s], u the largest relative speed [m/s], t
-the thickness of the thinnest body [m] and e the shortest mean edge of a body [m], all at the start
-of the frame. LINGERING replaces TRAVEL while there may be overlaps older than the step. At the end
-of the frame the step must still be below ``UNSTABLE`` 2 / omega, and its damping within
-``damping.reach_for``. A frame that fails is repeated at the rates found there.
+All are those of one world: omega the largest frequency of the elastic forces [1/s], u the largest
+relative speed [m/s], t the thickness of the thinnest body [m] and e the shortest mean edge of a
+body [m], all at the start of the frame. LINGERING replaces TRAVEL while there may be overlaps older
+than the step. At the end of the frame the step must still be below ``UNSTABLE`` 2 / omega, and its
+damping within ``damping.reach_for``. A frame that fails is repeated at the rates found there.
 """
 
-import math
+import numpy as np
 
 from warp_contact.frame.damping import reach_for
 from warp_contact.kernels.lengths import LINGERING, TRAVEL
@@ -30,10 +30,10 @@ LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.6
 KEEP = 0.9
 
 
-def steps_per_second(
-    omega: float, speed: float, thickness: float, edge: float, overlaps: bool
-) -> float:
+def steps_per_second(omega, speed, thickness, edge, overlaps: bool):
     """Steps [1/s] that are stable, and short against the thinnest body and the edges.
+
+    All but the last may be arrays, of one value a world.
 
     Args:
         omega: largest frequency [1/s]
@@ -45,38 +45,37 @@ def steps_per_second(
     stable = omega / (2.0 * SAFETY)
     passing = speed / (REACH * thickness)
     travel = LINGERING if overlaps else TRAVEL
-    gentle = min(speed / (travel * edge), PATIENCE * stable)
-    return max(stable, passing, gentle)
+    gentle = np.minimum(speed / (travel * edge), PATIENCE * stable)
+    return np.maximum(np.maximum(stable, passing), gentle)
 
 
-def steps_in_frame(per_second: float, fps: float, last: int) -> int:
+def steps_in_frame(per_second, fps: float, last):
     """Whole steps in a frame: ``per_second`` [1/s], at least KEEP of the ``last`` frame's."""
-    return max(1, int(KEEP * last), math.ceil(per_second / fps))
+    kept = np.floor(KEEP * np.asarray(last))
+    return np.maximum(np.maximum(1, kept), np.ceil(per_second / fps)).astype(int)
 
 
-def with_penalty(omega: float, stiffness: float, inv_mass: float) -> float:
+def with_penalty(omega, stiffness: float, inv_mass):
     """Frequency [1/s] with a penalty [N/m] on the lightest vertex, of ``inv_mass`` [1/kg]."""
-    return math.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
+    return np.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
 
 
-def stays_stable(dt: float, omega: float) -> bool:
+def stays_stable(dt, omega):
     """Whether a step ``dt`` [s] is stable at the frequency ``omega`` [1/s] of its frame's end."""
     return dt * omega <= UNSTABLE * 2.0
 
 
-def stays_damped(dt: float, rate: float, after: float) -> bool:
+def stays_damped(dt, rate, after):
     """Whether the stages for the damping ``rate`` [1/s] suffice for that ``after`` too."""
     return after * dt <= reach_for(rate, dt)
 
 
-def served(dt: float) -> float:
+def served(dt):
     """The frequency [1/s] that a step ``dt`` [s] is chosen for, where no other limit counts."""
     return 2.0 * SAFETY / dt
 
 
-def raised(
-    before: tuple[float, float], after: tuple[float, float], dt: float, least: float = RAISED
-) -> tuple[float, float]:
+def raised(before, after, dt, least: float = RAISED):
     """Frequency and damping rate [1/s] for the repeat of a frame whose step was too long.
 
     Args:
@@ -85,9 +84,10 @@ def raised(
         dt: the step [s], which other limits than ``before`` may have shortened
         least: times the frequency, at least
     """
-    most = EXPLODED * max(before[0], served(dt))
-    fast = max(before[1], min(after[1], EXPLODED**2 * max(before[1], 1.0 / dt)))
-    return min(max(least * before[0], after[0]), most), fast
+    most = EXPLODED * np.maximum(before[0], served(dt))
+    fast = np.minimum(after[1], EXPLODED**2 * np.maximum(before[1], 1.0 / dt))
+    slow = np.maximum(least * before[0], after[0])
+    return np.minimum(slow, most), np.maximum(before[1], fast)
 
 
 def fault(dt: float, omega: float, speed: float, thickness: float) -> str:

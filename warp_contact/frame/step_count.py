@@ -7,6 +7,8 @@ from warp_contact.data.state import State
 from warp_contact.errors import SimulationError
 from warp_contact.frame import step_bounds
 from warp_contact.frame.diagnosis import flattest_tet
+from warp_contact.frame.last_frame import LastFrame
+from warp_contact.frame.worlds import Worlds
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 
@@ -26,51 +28,54 @@ class StepCount:
         fps: float,
         wanted: int | None,
         most: int,
+        worlds: Worlds,
     ):
-        """Read sizes and worlds of the bodies once."""
+        """Read sizes of the bodies once."""
         self.fps = fps
         self.wanted = wanted
         self.most = most
         self._model = model
         self._response = response
         self._leaves = not isinstance(response, ContactSurface) or response.search == "literal"
-        self._thickness = float(model.body_thickness.numpy().min())
-        self._edge = float(model.body_edge.numpy().min())
-        of_bodies = np.unique(model.body_world.numpy(), return_inverse=True)[1]
-        self._world = of_bodies[model.vert_body.numpy()]
-        self._largest_inv_mass = float(model.inv_mass.numpy().max())
+        self._worlds = worlds
+        self._thickness = -worlds.most(-model.body_thickness.numpy().astype(np.float64))
+        self._edge = -worlds.most(-model.body_edge.numpy().astype(np.float64))
+        lightest = np.zeros(worlds.n)
+        np.maximum.at(lightest, worlds.of_vert, model.inv_mass.numpy())
+        self._largest_inv_mass = lightest
 
     def steps(
-        self, state: State, omega: float, stiffest: int, last: int, frame: int, overlapping: bool
-    ) -> int:
-        """Steps of frame number ``frame``, after one of ``last`` steps.
+        self, state: State, of_bodies: np.ndarray, omega: np.ndarray, last: LastFrame, frame: int
+    ) -> np.ndarray:
+        """Steps of each world in frame number ``frame``, shape (n_world,).
 
         Args:
             state: at its start
-            omega: largest frequency of the elastic forces [1/s]
-            stiffest: the body with that frequency
-            last: steps of the frame before
+            of_bodies: the largest frequency of each body [1/s], shape (n_body,)
+            omega: the one that is reckoned with in each world [1/s], shape (n_world,)
+            last: numbers of the frame before; ``overlapping`` is known
             frame: its number, for the message
-            overlapping: whether there may be overlaps that no step created
 
         Raises:
             SimulationError: no step is stable, or more than ``most`` are needed
         """
-        if not np.isfinite(omega):
+        if not np.isfinite(omega).all():
             tet = flattest_tet(self._model, state.x)
             raise SimulationError(f"frame {frame}: {tet} is too flat: no step is stable")
         if self.wanted:
-            return self.wanted
+            return np.full(self._worlds.n, self.wanted)
         omega, speed = self._with_response(omega), self._speed(state)
-        sizes = self._thickness, self._edge
-        per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlapping or self._leaves)
-        n = step_bounds.steps_in_frame(per_second, self.fps, last)
-        if n > self.most:
-            cause = self._of_stiffness(state, stiffest, omega)
-            if per_second > step_bounds.PATIENCE * omega:  # the speed asks for them
-                cause = self._of_speed(state, speed)
+        sizes, overlaps = (self._thickness, self._edge), last.overlapping or self._leaves
+        per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
+        n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
+        w = int(n.argmax())
+        if n[w] > self.most:
+            body = int(np.where(self._worlds.of_body == w, of_bodies, -1.0).argmax())
+            cause = self._of_stiffness(state, body, omega[w])
+            if per_second[w] > step_bounds.PATIENCE * omega[w]:  # the speed asks for them
+                cause = self._of_speed(state, w, speed[w])
             few = f"max_substeps={self.most}"
-            raise SimulationError(f"frame {frame} needs {n} substeps, more than {few}: {cause}")
+            raise SimulationError(f"frame {frame} needs {n[w]} substeps, more than {few}: {cause}")
         return n
 
     def _of_stiffness(self, state: State, body: int, omega: float) -> str:
@@ -83,19 +88,20 @@ class StepCount:
         remedy = "check density [kg/m^3], modulus [Pa], size [m] and tets, or raise max_substeps"
         return f"{name} vibrates at {omega / (2.0 * np.pi):.3g} Hz ({flattest}); {remedy}"
 
-    def _of_speed(self, state: State, speed: float) -> str:
+    def _of_speed(self, state: State, world: int, speed: float) -> str:
         """The same where motion limits it."""
-        vertex = int(np.linalg.norm(state.v.numpy(), axis=1).argmax())
+        own = self._worlds.of_vert == world
+        vertex = int(np.where(own, np.linalg.norm(state.v.numpy(), axis=1), -1.0).argmax())
         name = f"body '{self._model.labels[self._model.vert_body.numpy()[vertex]]}'"
         remedy = "check its velocity [m/s], or raise max_substeps"
         return f"{name} moves at up to {speed:.3g} m/s against others; {remedy}"
 
-    def check(self, state: State, omega: float, frame: int) -> None:
+    def check(self, state: State, omega: np.ndarray, frame: int) -> None:
         """Refuse steps that the user chose too long; the motion in a step counts in frame 1 only.
 
         Args:
             state: at the start of the frame
-            omega: largest frequency of the elastic forces [1/s]
+            omega: largest frequency of the elastic forces of each world [1/s], shape (n_world,)
             frame: number of the frame
 
         Raises:
@@ -103,23 +109,25 @@ class StepCount:
         """
         if not self.wanted:
             return
-        speed = self._speed(state) if frame == 1 else 0.0
+        speed = self._speed(state) if frame == 1 else np.zeros(self._worlds.n)
         dt = 1.0 / (self.fps * self.wanted)
-        wrong = step_bounds.fault(dt, self._with_response(omega), speed, self._thickness)
-        if wrong:
-            raise SimulationError(f"frame {frame}: substeps={self.wanted} is too few: {wrong}")
+        for w, fastest in enumerate(self._with_response(omega)):
+            wrong = step_bounds.fault(dt, fastest, speed[w], self._thickness[w])
+            if wrong:
+                few = f"substeps={self.wanted} is too few"
+                raise SimulationError(f"frame {frame}: {few}: {wrong}")
 
-    def _with_response(self, omega: float) -> float:
-        """The frequency [1/s] of the elastic forces, or that of a penalty with them."""
+    def _with_response(self, omega: np.ndarray) -> np.ndarray:
+        """The frequencies [1/s] of the elastic forces, or those of a penalty with them."""
         if isinstance(self._response, Penalty):
             return step_bounds.with_penalty(omega, self._response.stiffness, self._largest_inv_mass)
         return omega
 
-    def _speed(self, state: State) -> float:
-        """Largest relative speed within a world in the frame to come [m/s]."""
+    def _speed(self, state: State) -> np.ndarray:
+        """Largest relative speed within each world in the frame to come [m/s], shape (n_world,)."""
         v = state.v.numpy()
-        most, least = np.full((2, self._world.max() + 1, 3), -np.inf)
-        np.maximum.at(most, self._world, v)
-        np.maximum.at(least, self._world, -v)
-        speed = float(np.linalg.norm(most + least, axis=1).max())
+        most, least = np.full((2, self._worlds.n, 3), -np.inf)
+        np.maximum.at(most, self._worlds.of_vert, v)
+        np.maximum.at(least, self._worlds.of_vert, -v)
+        speed = np.linalg.norm(most + least, axis=1)
         return speed + float(np.linalg.norm(self._model.gravity)) / self.fps

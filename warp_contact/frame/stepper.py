@@ -11,15 +11,15 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.errors import SimulationError
-from warp_contact.frame import between, checkpoint
+from warp_contact.frame import between, memory
 from warp_contact.frame.buffers import Buffers
 from warp_contact.frame.capacity import enlarged
 from warp_contact.frame.damping import prepare, stages_for
 from warp_contact.frame.diagnosis import lost_vertex
 from warp_contact.frame.frame_start import FrameStart
-from warp_contact.frame.last_frame import LastFrame, last_frame_of
+from warp_contact.frame.last_frame import LastFrame, none_yet
 from warp_contact.frame.overlap import overlaps
-from warp_contact.frame.rates import NO_RATES, rates_now
+from warp_contact.frame.rates import rates_now
 from warp_contact.frame.sleeping import Sleeping
 from warp_contact.frame.spectrum import Spectrum
 from warp_contact.frame.step_bounds import (
@@ -31,7 +31,8 @@ from warp_contact.frame.step_bounds import (
     stays_stable,
 )
 from warp_contact.frame.step_count import StepCount
-from warp_contact.step.damping import scale_contacts
+from warp_contact.frame.turns import Turns, segments
+from warp_contact.frame.worlds import Worlds
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.step.velocity import answer_of, shift_velocities, velocities_now
 
@@ -51,6 +52,7 @@ class Stepper:
         buffers: what the steps fill
         sleeping: which bodies sleep; None where none may
         spectrum: finds the rates
+        worlds: those that take steps of their own
     """
 
     def __init__(
@@ -65,17 +67,20 @@ class Stepper:
     ):
         """Allocate what the steps need, on the current device."""
         self.fps, self.wanted = fps, wanted
-        self.last = LastFrame()
-        self.first = state.x.numpy().copy(), state.v.numpy().copy()
-        self._model, self._state = model, state
-        self._step_count = StepCount(model, response, fps, wanted, most)
-        self.spectrum = Spectrum(model)
         # Without gravity, a slow body may be in free flight, not at rest.
         may_sleep = sleeping and any(model.gravity)
+        self.worlds = Worlds(model, apart=not may_sleep)
+        self.last = none_yet(self.worlds.n)
+        self.first = state.x.numpy().copy(), state.v.numpy().copy()
+        self._model, self._state = model, state
+        self._step_count = StepCount(model, response, fps, wanted, most, self.worlds)
+        self.spectrum = Spectrum(model, self.worlds)
         self.sleeping = Sleeping(model, state, fps) if may_sleep else None
-        awake = self.sleeping.awake if self.sleeping else None
-        self.buffers = Buffers(model, state, response, awake)
+        self._turns = Turns(model, self.worlds) if self.worlds.n > 1 else None
+        awake = getattr(self.sleeping or self._turns, "awake", None)
+        self.buffers = Buffers(model, state, response, awake, self.worlds)
         self._start = FrameStart(state, self.work)
+        self._cut, self._first_capacity = False, self.work.capacity
 
     @property
     def work(self) -> Work:
@@ -85,13 +90,10 @@ class Stepper:
     def step(self, frame: int) -> None:
         """Step frame number ``frame``.
 
-        A frame that outgrew its buffers, or whose step turned out too long for the deformation
+        A frame that outgrew its buffers, or whose steps turned out too long for the deformation
         that came, is repeated from its start. If it begins or ends with a tet that is nearly
-        flat, the rates are checked every ``PART`` steps.
-
-        Whatever ends it early, an interrupt too, leaves all as the last frame had left it.
-
-        Raises SimulationError where no step is stable or the state does not stay finite.
+        flat, the rates are checked every ``PART`` steps. Whatever ends it early, an interrupt too,
+        leaves all as the last frame had left it; SimulationError says why no step is possible.
         """
         self._begin()
         try:
@@ -106,56 +108,62 @@ class Stepper:
         while overlapping is None or self.grow():
             overlapping = overlaps(self._model, self._state, self.work)
         self._overlapping = overlapping
-        dt, rates = self._find_step(frame)
+        rates = self._find_step(frame)
         old = overlapping and bool(self.work.surface.was_old.numpy()[0])
-        self.last = LastFrame(self._n, dt, rates, old)
+        self.last = LastFrame(self._n, self._dt, rates, old)
 
     def _all_sleep(self) -> bool:
         """Decide which bodies sleep; where all do, nothing moves in this frame."""
-        if not self.sleeping:
-            return False
-        if self.last.overlapping is not False:  # an overlap that is left has to be searched
+        # An overlap that is left has to be searched.
+        if not self.sleeping or self.last.overlapping is not False:
             return False
         if self.sleeping.update(self._state, self.work):
             return False
         self.sleeping.skip_frame(self._state, self.work)
         return True
 
-    def _find_step(self, frame: int) -> tuple[float, tuple[float, float]]:
-        """Step the frame until its step fits; return the step [s] and the last rates."""
-        omega, rate = self.last.rates or self.spectrum.rates(self._state.x)
-        self._step_count.check(self._state, omega, frame)
+    def _find_step(self, frame: int) -> np.ndarray:
+        """Step the frame until its steps fit; return the last rates [1/s], (2, n_world)."""
+        rates = self.last.rates
+        rates = self.spectrum.rates(self._state.x) if rates is None else rates
+        self._step_count.check(self._state, rates[0], frame)
         halved = 0
         in_parts = self._flat()
         for _ in range(ATTEMPTS):
-            dt, after, wrong = self._run(omega, rate, frame, in_parts)
-            fits = not wrong and self._fits(dt, rate, after)
-            while fits and self.grow():  # what explodes would ask for any number of pairs
-                dt, after, wrong = self._run(omega, rate, frame, in_parts)
-                fits = not wrong and self._fits(dt, rate, after)
+            kept = self.spectrum.memory()
+            after, wrong = self._run(rates, frame, in_parts)
+            fits = self._fit(rates, after)
+            while not wrong and fits.all() and self.grow():
+                self.spectrum.remind(kept)
+                kept = self.spectrum.memory()
+                after, wrong = self._run(rates, frame, in_parts)
+                fits = self._fit(rates, after)
+            # What explodes would ask for any number of pairs: then nothing grows.
+            self._cut = self._cut or enlarged(self.work) is not None
+            good = not wrong and bool(fits.all())
             flat = in_parts or bool(wrong) or self._flat()
-            if fits and (in_parts or not flat):
-                return dt, after
+            if good and (in_parts or not flat):
+                return after
             self._start.go_back(self._state, self.work)
             if wrong:
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
-                    raise SimulationError(f"frame {frame}: {wrong} ({self._n} substeps)")
+                    raise SimulationError(f"frame {frame}: {wrong} ({self._n.max()} substeps)")
                 halved += 1
-                omega, rate = 2.0 * max(omega, served(dt)), 2.0 * rate
-            elif not fits:
+                rates = 2.0 * np.stack([np.maximum(rates[0], served(self._dt)), rates[1]])
+            elif not good:
                 least = CUT_SHORT if in_parts else RAISED
-                omega, rate = raised((omega, rate), after, dt, least)
+                rates = np.where(fits, rates, raised(rates, after, self._dt, least))
             in_parts = flat
-        raise SimulationError(f"frame {frame}: no stable step found ({self._n} substeps)")
+        raise SimulationError(f"frame {frame}: no stable step found ({self._n.max()} substeps)")
 
     def _flat(self) -> bool:
         """Whether a tet was flat at the last check, and the number of steps is free."""
         return self.wanted is None and self.spectrum.flat
 
-    def _fits(self, dt: float, rate: float, after: tuple[float, float]) -> bool:
-        """Whether steps ``dt`` [s] for damping at a ``rate`` [1/s] fit the rates ``after`` them."""
-        stable = self.wanted is not None or stays_stable(dt, after[0])
-        return stable and stays_damped(dt, rate, after[1])
+    def _fit(self, rates: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Worlds whose steps, chosen for ``rates`` [1/s], fit the rates ``after`` them."""
+        stable = self.wanted is not None or stays_stable(self._dt, after[0])
+        return stable & stays_damped(self._dt, rates[1], after[1])
 
     def velocities(self) -> np.ndarray:
         """Velocities [m/s] at the time of the positions, shape (n_vert, 3)."""
@@ -170,13 +178,13 @@ class Stepper:
 
     def set_velocities(self, values: np.ndarray, at: np.ndarray, body: int) -> None:
         """Set ``values`` [m/s], shape (k, 3), at vertices ``at`` (k,) of a body."""
-        between.set_velocities(self._model, self._state, self.work, self.last, values, at)
+        between.set_velocities(self._model, self._state, self.work, self.last_dt, values, at)
         if self.sleeping:
             self.sleeping.wake(body)
 
     def set_positions(self, x: np.ndarray) -> None:
         """Set positions [m], shape (n_vert, 3); overlaps and rates are found before a frame."""
-        given = self._model, self._state, self.work, self.last
+        given = self._model, self._state, self.work, self.last_dt
         between.set_positions(*given, x, self.velocities())
         self.last = replace(self.last, overlapping=None, rates=None)
         if self.sleeping:
@@ -184,9 +192,12 @@ class Stepper:
 
     def reset(self) -> None:
         """Begin anew from the first positions and velocities."""
+        if self._cut:  # where frames end depends on the room that there is
+            self.buffers.replace(self._first_capacity)
+            self._cut = False
         for array, first in zip((self._state.x, self._state.v), self.first, strict=True):
             array.assign(first)
-        self.last = LastFrame()
+        self.last = none_yet(self.worlds.n)
         self.spectrum.start_from({})
         warm_start.forget(self.work.warm)
         damping.forget(self.work.damping)
@@ -209,91 +220,81 @@ class Stepper:
 
     def values(self) -> dict[str, np.ndarray]:
         """What a checkpoint needs, beside the state."""
-        work = self.work
-        groups = {"last": self.last.values(), "start": self.spectrum.starts()}
-        groups |= {"warm": warm_start.values(work.warm), "damping": damping.values(work.damping)}
-        if self.sleeping:
-            groups["sleeping"] = self.sleeping.values(work)
-        return checkpoint.ungroup(groups)
+        return memory.values_of(self.last, self.spectrum, self.work, self.sleeping)
 
     def restore(self, values: dict[str, np.ndarray]) -> None:
         """Take over the ``values`` of another instance with the same scene and settings."""
-        self.last = last_frame_of(checkpoint.group(values, "last"))
-        self.spectrum.start_from(checkpoint.group(values, "start"))
-        sleeping = checkpoint.group(values, "sleeping")
-        impulses = checkpoint.group(values, "warm")
-        have = self.work.capacity
-        pairs = max(have.pairs, len(sleeping.get("pair_key", ())))
-        contacts = max(have.contacts, len(impulses["edges"]))
-        self.buffers.replace(replace(have, pairs=pairs, contacts=contacts))
-        warm_start.restore(self.work.warm, impulses)
-        damping.restore(self.work.damping, checkpoint.group(values, "damping"))
-        if self.sleeping:
-            self.sleeping.restore(sleeping, self.work)
+        self.last = memory.restore(values, self.spectrum, self.buffers, self.sleeping)
+
+    @property
+    def last_dt(self) -> np.ndarray:
+        """The last step of each vertex [s], shape (n_vert,)."""
+        return self.last.dt[self.worlds.of_vert]
 
     def _velocities(self) -> wp.array:
         answer = answer_of(self.buffers.response, self.last.overlapping is False)
-        return velocities_now(self._model, self._state, self.work, self.last.dt, answer)
+        return velocities_now(self._model, self._state, self.work, self.last_dt, answer)
 
-    def _run(
-        self, omega: float, rate: float, frame: int, in_parts: bool
-    ) -> tuple[float, tuple[float, float], str]:
-        """Step the frame at the rates [1/s] given.
+    def _run(self, rates: np.ndarray, frame: int, in_parts: bool) -> tuple[np.ndarray, str]:
+        """Step the frame for the rates given [1/s], shape (2, n_world).
 
-        Return the step [s] and what ``rates_now`` finds at the end. With ``in_parts`` the frame
-        ends as soon as its step no longer fits. It ends early where buffers were too small.
+        Return what ``rates_now`` finds at the end. With ``in_parts`` the frame ends as soon as its
+        steps no longer fit. It ends early where buffers were too small.
         """
-        work = self.work
+        work, of_vert = self.work, self.worlds.of_vert
+        if self._turns:
+            self._turns.let_all(work)
         if self.sleeping:
             self.sleeping.begin_frame(self._state, work)
         else:
             contact_forces.clear(work.forces)
-        given = omega, self.spectrum.stiffest, self.last.n, frame, bool(self._overlapping)
-        n = self._step_count.steps(self._state, *given)
-        dt = 1.0 / (self.fps * n)
-        damping_stages = self._prepare_damping(rate, dt, frame)
-        shift_velocities(self._model, self._state, work, work.awake, 0.5 * (self.last.dt - dt))
-        work.dt.fill_(dt)
+        now = replace(self.last, overlapping=self._overlapping)
+        given = self.spectrum.of_bodies[0], rates[0], now, frame
+        self._n = self._step_count.steps(self._state, *given)
+        self._dt = 1.0 / (self.fps * self._n)
+        if work.damping and stages_for(rates[1], self._dt) > MOST:
+            raise SimulationError(f"frame {frame}: {self._too_damped(rates[1])}")
+        damping_stages = prepare(work.damping, rates[1], self._dt, of_vert, self.last.dt)
+        lag = 0.5 * (self.last.dt - self._dt)[of_vert]
+        shift_velocities(self._model, self._state, work, work.awake, lag)
+        work.dt.assign(self._dt[of_vert].astype(np.float32))
         work.overflow.all.zero_()
         work.surface.was_old.zero_()
         work.broad_phase.bodies.rebuild()
-        self._n = n
-        after, wrong = NO_RATES, ""
-        part = PART if in_parts else n
-        for first in range(0, n, part):
-            work.steps.fill_(min(part, n - first))
-            wp.capture_launch(self.buffers.graph(damping_stages, bool(self._overlapping)))
+        graph = self.buffers.graph(damping_stages, bool(self._overlapping))
+        most = int(self._n.max())
+        for count, begun in segments(self._n, PART if in_parts else most):
+            if self._turns:
+                self._turns.begin(begun, self._dt, work, self._start)
+            work.steps.fill_(count)
+            wp.capture_launch(graph)
             after, wrong = rates_now(self._model, self._state, self.spectrum)
-            if wrong or not self._fits(dt, rate, after) or enlarged(work) is not None:
+            if wrong or not self._fit(rates, after).all() or enlarged(work) is not None:
                 break
-        return dt, after, wrong
+        return after, wrong
 
-    def _prepare_damping(self, rate: float, dt: float, frame: int) -> int:
-        """Prepare steps ``dt`` [s] for a damping ``rate`` [1/s]; return the stages of each."""
-        d = self.work.damping
-        if d and stages_for(rate, dt) > MOST:
-            name = self._model.labels[self.spectrum.most_damped]
-            raise SimulationError(
-                f"frame {frame}: motion within body '{name}' decays at up to {rate:.3g} 1/s, "
-                f"too fast for a step of {dt:.3g} s: check its damping [s] and its tets"
-            )
-        if d and self.last.dt not in (0.0, dt):
-            scale_contacts(self._model, d, dt / self.last.dt)
-        return prepare(d, rate, dt)
+    def _too_damped(self, rates: np.ndarray) -> str:
+        """Why no step can take such damping ``rates`` [1/s], shape (n_world,)."""
+        label = self._model.labels[int(self.spectrum.of_bodies[1].argmax())]
+        fast = f"decays at up to {rates.max():.3g} 1/s"
+        step = f"too fast for a step of {self._dt.max():.3g} s: check its damping [s] and its tets"
+        return f"motion within body '{label}' {fast}, {step}"
 
     def _begin(self) -> None:
         """Keep what a frame changes."""
         self._start.keep(self._state, self.work)
         self._before = self.last
-        self.spectrum.save()
+        self._memory = self.spectrum.memory()
         if self.sleeping:
             self.sleeping.save()
 
     def _undo(self) -> None:
         """Leave the frame as if it had not begun, wherever it was interrupted."""
         self.last = self._before
-        self.spectrum.undo()
+        self.spectrum.remind(self._memory)
         if self.sleeping:
             self.sleeping.undo()
         self.buffers.mend(self._start.n_pair)
+        if self._turns:
+            self._turns.let_all(self.work)
         self._start.undo(self._state, self.work)

@@ -96,11 +96,12 @@ class Meter:
         self.tunnelling = Tunnelling(model, self.names, self._trees)
 
     def measure(
-        self, state: State, v: np.ndarray, work: Work, duration: float, dt: float
+        self, state: State, v: np.ndarray, work: Work, duration: float, dt: np.ndarray
     ) -> Measure:
-        """Measure a state; impulses were recorded for ``duration`` [s] in steps of ``dt`` [s].
+        """Measure a state; impulses were recorded for ``duration`` [s].
 
-        ``v`` are its velocities at the time of the positions [m/s], shape (n_vert, 3).
+        ``v`` are its velocities at the time of the positions [m/s], shape (n_vert, 3), ``dt`` the
+        steps [s], shape (n_vert,).
         """
         model = self.model
         x = state.x.numpy().astype(np.float64)
@@ -131,17 +132,18 @@ class Meter:
             forces=self.forces(work, duration),
         )
 
-    def _kinetic(self, state: State, work: Work, dt: float) -> float:
+    def _kinetic(self, state: State, work: Work, dt: np.ndarray) -> float:
         """Kinetic energy [J], see ``Measure``."""
         v = state.v.numpy().astype(np.float64)
         lagging = 0.5 * (self.mass[:, None] * v * v).sum()
-        power = (self._forces(state.x) * v).sum()
+        power = (self._forces(state.x) * v).sum(axis=1)
         pair = _contacts(work)["pair"]
         mass = np.bincount(self._body, self.mass)
+        of_bodies = dt[self.model.body_vert.numpy()[:-1]]
         mass[np.unique(pair[pair < len(mass)])] = 0.0
         mass[self._body[self.model.inv_mass.numpy() == 0.0]] = 0.0
-        fall = mass.sum() * np.square(self.model.gravity).sum()
-        return float(lagging + 0.5 * dt * power + 0.125 * dt * dt * fall)
+        fall = (mass * of_bodies**2).sum() * np.square(self.model.gravity).sum()
+        return float(lagging + 0.5 * (dt * power).sum() + 0.125 * fall)
 
     def _forces(self, x: wp.array) -> np.ndarray:
         """Internal forces and weight [N] of the mobile vertices, shape (n_vert, 3)."""

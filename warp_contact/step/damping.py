@@ -44,11 +44,11 @@ def damp(model: Model, x: wp.array, v: wp.array, work: Work, stages: int) -> Non
     if not all(e.damped for e in model.elements):
         work.f_tet.zero_()
     apply_damping(model, x, v, work.f_tet)
-    wp.launch(kernels.begin, model.n_vert, inputs=[*at_vertex, d.coef], outputs=[d.even, v])
+    wp.launch(kernels.begin, model.n_vert, inputs=[*at_vertex, d.row, d.coef], outputs=[d.even, v])
     last, r = d.even, d.odd
     for k in range(1, stages):
         apply_damping(model, x, last, work.f_tet)
-        inputs = [k, *at_vertex, d.reach, d.coef, last]
+        inputs = [k, *at_vertex, d.row, d.reach, d.coef, last]
         wp.launch(kernels.go_on, model.n_vert, inputs=inputs, outputs=[r, v])
         last, r = r, last
 
@@ -59,6 +59,6 @@ def remember_contacts(model: Model, state: State, d: Damping) -> None:
     wp.launch(kernels.remember, model.n_vert, inputs=inputs, outputs=[d.last, d.before])
 
 
-def scale_contacts(model: Model, d: Damping, by: float) -> None:
-    """Expect of contacts what they do in steps ``by`` times as long as the last."""
-    wp.launch(kernels.scale, model.n_vert, inputs=[by], outputs=[d.last, d.before])
+def scale_contacts(d: Damping, by: wp.array) -> None:
+    """Expect of contacts what they do in steps ``by`` times as long as the last, (n_vert,)."""
+    wp.launch(kernels.scale, len(by), inputs=[by], outputs=[d.last, d.before])

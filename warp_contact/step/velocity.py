@@ -8,6 +8,7 @@ act, and contacts answer: impulses keep what touches from approaching (Andersen 
 from collections.abc import Callable
 from functools import partial
 
+import numpy as np
 import warp as wp
 
 from warp_contact.data.launch import if_any
@@ -21,15 +22,18 @@ from warp_contact.step.other_responses import push_half_step
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 
-def velocities_now(model: Model, state: State, work: Work, dt: float, answer: Callable) -> wp.array:
-    """Velocities [m/s] at the time of ``state.x``, shape (n_vert,), after steps ``dt`` [s].
+def velocities_now(
+    model: Model, state: State, work: Work, dt: np.ndarray, answer: Callable
+) -> wp.array:
+    """Velocities [m/s] at the time of ``state.x``, shape (n_vert,).
 
-    ``answer`` is that of ``answer_of``. The contacts in ``work`` and the forces of the frame
-    change; where they did not fit, see ``work.overflow``, the result is none.
+    ``dt`` is the last step of each vertex [s], shape (n_vert,), ``answer`` is that of
+    ``answer_of``. The contacts in ``work`` and the forces of the frame change; where they did not
+    fit, see ``work.overflow``, the result is none.
     """
     now = State(state.x, wp.clone(state.v))
-    if dt > 0.0:
-        work.dt.fill_(0.5 * dt)
+    if dt.any():
+        work.dt.assign((0.5 * dt).astype(np.float32))
         work.overflow.all.zero_()
         kick(model, now, work, work.awake)
         broad_phase.refresh(model, state.x, work.x, work)
@@ -37,10 +41,15 @@ def velocities_now(model: Model, state: State, work: Work, dt: float, answer: Ca
     return now.v
 
 
-def shift_velocities(model: Model, state: State, work: Work, awake: Awake, time: float) -> None:
-    """Let ``state.v`` of what is ``awake`` belong to ``time`` [s] later, without contacts."""
-    if time != 0.0:
-        work.dt.fill_(time)
+def shift_velocities(
+    model: Model, state: State, work: Work, awake: Awake, time: np.ndarray
+) -> None:
+    """Let ``state.v`` of what is ``awake`` belong to ``time`` [s] later, without contacts.
+
+    ``time`` is that of each vertex, shape (n_vert,).
+    """
+    if time.any():
+        work.dt.assign(time.astype(np.float32))
         kick(model, state, work, awake)
 
 

@@ -23,6 +23,12 @@ ARRAYS = {"vertices": ("fiu", 3), "tets": ("iu", 4)}  # of an .npz: kinds of num
 BYTES = 2**31  # of an array: more vertices or tets are no mesh that a machine simulates
 SECONDS = 10.0, 2.0  # that a reader may take: for any file, and for each MB of it
 MEMORY = 3 * 2**30, 100  # that it may take [bytes]: for any file, and for each byte of it
+FEW_THREADS = {  # each thread of a library reserves memory, on machines of many cores too much
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "PXR_WORK_THREAD_LIMIT": "1",
+    "MALLOC_ARENA_MAX": "2",
+}
 USUAL = 1e-4, 10.0  # size [m] of what is simulated: another one may be in another unit
 FILL = (
     "fill it first, by gmsh, or by fTetWild (pip install pytetwild pyvista): "
@@ -100,8 +106,7 @@ def in_child(kind: str, path: Path, argument: str = "", size: int | None = None)
     size = path.stat().st_size if size is None else size
     seconds, memory = SECONDS[0] + SECONDS[1] * size / 1e6, MEMORY[0] + MEMORY[1] * size
     command = [sys.executable, "-P", reading.__file__, kind, str(path), argument, str(memory)]
-    env = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    env["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
+    env = os.environ | FEW_THREADS | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     try:
         done = subprocess.run(
             command,
@@ -113,7 +118,8 @@ def in_child(kind: str, path: Path, argument: str = "", size: int | None = None)
         )
     except subprocess.TimeoutExpired as error:
         late = f"reading it took more than {seconds:.0f} s"
-        raise MeshError(f"{path}: {late}: it is damaged; write it anew") from error
+        busy = "it is damaged, or the machine is very busy"
+        raise MeshError(f"{path}: {late}: {busy}") from error
     answer = done.stdout
     if answer[:1] == b"-":
         raise MeshError(f"{path}: {answer[1:].decode(errors='replace')}")

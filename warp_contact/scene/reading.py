@@ -148,7 +148,8 @@ def opened(path: str):
 def in_short(text: str) -> str:
     """The essence of an error of another library in one line; USD quotes it among much else."""
     said = re.findall(r" : '(.*?)'\s*(?:\n|$)", text, re.DOTALL)
-    return " ".join((said or [text])[0].split())[:200]
+    text = re.sub(r"pxrInternal\w*::", "", (said or [text])[0])
+    return " ".join(text.split())[:200]
 
 
 READERS = {"meshio": read_meshio, "usd": read_usd, "stage": read_stage}

@@ -119,7 +119,8 @@ def usd_errors(path) -> Iterator[None]:
 def in_short(error: Exception) -> str:
     """The essence of an error in one line; USD quotes it among much else."""
     said = re.findall(r" : '(.*?)'\s*(?:\n|$)", str(error), re.DOTALL)
-    return " ".join((said or [str(error)])[0].split())[:300]
+    text = re.sub(r"pxrInternal\w*::", "", (said or [str(error)])[0])
+    return " ".join(text.split())[:300]
 
 
 def place(prim: Usd.Prim) -> str:

@@ -174,6 +174,20 @@ def test_a_damaged_vtk_is_refused(given, words, tmp_path):
         TetMesh.load(tmp_path / "a.vtk")
 
 
+@pytest.mark.parametrize("last", [0, -1, 5, 99])
+@pytest.mark.parametrize("version", ["gmsh22", "gmsh"])
+def test_a_gmsh_file_that_names_another_node_is_refused(last, version, tmp_path):
+    meshio = pytest.importorskip("meshio")
+    x = np.concatenate([[[0.0, 0.0, 0.0]], np.eye(3)])
+    path = tmp_path / "a.msh"
+    meshio.write(path, meshio.Mesh(x, [("tetra", [[0, 1, 2, 3]])]), version, binary=False)
+    assert TetMesh.load(path).volume == pytest.approx(1.0 / 6.0)
+    head, words, tail = path.read_text().partition("$Elements")
+    path.write_text(head + words + tail.replace("1 2 3 4", f"1 2 3 {last}"))
+    with pytest.raises(MeshError, match=r"a\.msh: "):
+        TetMesh.load(path)
+
+
 def test_what_is_no_regular_file_is_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe.usda")
     with pytest.raises(OSError, match="no file but a pipe or a device"):

@@ -98,3 +98,10 @@ def test_a_scene_warns_of_sizes_that_are_no_metres(size):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         Scene().add_body(box(min(max(size, 1e-6), 1e3), 1), RUBBER)
+
+
+@pytest.mark.parametrize("size", [5e-9, 2e9])
+def test_a_scene_refuses_sizes_without_a_place_in_float32(size):
+    mesh = box(1.0, 1).scaled(size, size, size)
+    with pytest.raises(ValueError, match=r"body 'body0': its mesh is .* m large, and must have"):
+        Scene().add_body(mesh, RUBBER)

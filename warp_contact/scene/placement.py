@@ -11,6 +11,7 @@ ROUNDING = 2.0**-24  # of a float32, at most
 # to rest end within 1 % of a size of where they do at the origin, at 3 within 4 %.
 DROWNED = 1.5
 STRAINED = 0.02  # strain that rounding of the positions may put on a tet
+POSSIBLE = 1e-8, 1e9  # size of a body [m] whose masses and volumes fit float32
 PLAUSIBLE = 0.9e-6, 1.1e3  # size of a body [m]; others run too
 
 
@@ -18,9 +19,14 @@ def check_shape(mesh, label: str) -> None:
     """Warn of a mesh [m] of an unlikely size, or one that falls apart along seams.
 
     Raises:
-        ValueError: every tet has vertices of its own
+        ValueError: every tet has vertices of its own, or its size has no place in float32
     """
     size = float(np.ptp(mesh.vertices, axis=0).max())
+    if not POSSIBLE[0] <= size <= POSSIBLE[1]:
+        raise ValueError(
+            f"its mesh is {size:.4g} m large, and must have {POSSIBLE[0]:g} to {POSSIBLE[1]:g} m: "
+            f"take mesh.scaled(...)"
+        )
     if not PLAUSIBLE[0] <= size <= PLAUSIBLE[1]:
         warnings.warn(
             f"body '{label}' is {size:.4g} m large; for millimetres load its mesh with unit=1e-3, "

@@ -13,7 +13,7 @@ import math
 import os
 import re
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 
 VOLUMES = ("tetra", "pyramid", "wedge", "hexahedron")  # and digits: cells that hold tets
 
@@ -77,6 +77,8 @@ def read_meshio(path: str, _) -> bytes:
 
     if not path.lower().endswith(tuple(meshio.extension_to_filetypes)):
         raise Unfit("its name has no ending that meshio knows, such as .msh, .vtk or .vtu")
+    with suppress(ImportError):  # another version of meshio
+        guard_gmsh()
     mesh = meshio.read(path)
     arrays, others = {"points": np.asarray(mesh.points)}, []
     for k, block in enumerate(mesh.cells):
@@ -85,6 +87,37 @@ def read_meshio(path: str, _) -> bytes:
         else:
             others.append(f"{len(block.data)} {block.type}")
     return packed(**arrays, others=np.array(", ".join(others)))
+
+
+def guard_gmsh() -> None:
+    """Let meshio refuse numbers of nodes below 1 in gmsh files, which it counts from the end."""
+    import numpy as np
+    from meshio.gmsh import _gmsh22, _gmsh40, _gmsh41
+
+    def above_zero(key):
+        numbers = isinstance(key, np.ndarray) and key.dtype.kind in "iu"
+        if numbers and key.astype(np.int64).min(initial=0) < 0:
+            raise Unfit("a cell names a vertex that the file does not hold")
+        return key
+
+    class Map(np.ndarray):
+        """From the number of a node to its place."""
+
+        def __getitem__(self, key):
+            return super().__getitem__(above_zero(key))
+
+        def __setitem__(self, key, value):
+            super().__setitem__(above_zero(key), value)
+
+    class Guarded:
+        """NumPy, with maps for the arrays that readers fill with -1."""
+
+        __getattr__ = staticmethod(lambda name: getattr(np, name))
+        ones = staticmethod(lambda *given, **more: np.ones(*given, **more).view(Map))
+        full = staticmethod(lambda *given, **more: np.full(*given, **more).view(Map))
+
+    for reader in (_gmsh22, _gmsh40, _gmsh41):
+        reader.np = Guarded()
 
 
 def read_usd(path: str, prim: str) -> bytes:

@@ -72,6 +72,14 @@ def vectors(value, n: int, name: str, most: float = LARGEST) -> np.ndarray:
     return numbers(value, (n, 3) if array_of(value).ndim == 2 else (3,), name, most)
 
 
+def sight(eye, target, of: str = "") -> tuple[np.ndarray, np.ndarray]:
+    """Where a camera stands and what it looks at, in different places, shape (3,) each."""
+    eye, target = numbers(eye, (3,), f"{of}eye"), numbers(target, (3,), f"{of}target")
+    if np.linalg.norm(eye - target) < SMALLEST:
+        raise refuse(f"{of}eye", eye.tolist(), "another place than that of the target")
+    return eye, target
+
+
 def count(value, name: str, least: int = 1, most: int = MOST) -> int:
     """A whole number from ``least`` to ``most``."""
     whole = isinstance(value, Integral) and not isinstance(value, bool | np.bool_)

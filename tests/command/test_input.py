@@ -134,7 +134,10 @@ def test_a_warning_is_one_line_too(tmp_path, capsys):
         ("def build():\n    import sys\n    sys.exit(0)", "SystemExit: 0"),
         ("def build():\n    pass", "what build() returns, None: give a wc.Scene"),
         ("def build():\n    return 3", "what build() returns, 3: give a wc.Scene"),
-        ("VIEW = {'eye': (1, 1, 1), 'target': (1, 1, 1)}", "an eye that is not in the place of"),
+        (
+            "VIEW = {'eye': (1, 1, 1), 'target': (1, 1, 1)}",
+            "[1.0, 1.0, 1.0]: give another place",
+        ),
         ("VIEW = {'eye': (1, 1, 1)}", "VIEW {'eye': (1, 1, 1)}: give {'eye': (x, y, z)"),
         ("VIEW = {'eye': (1, 1, 1), 'target': 'up'}", "VIEW target 'up': give finite numbers"),
         ("FRAMES = -1", "FRAMES -1: give a whole number from 1"),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd
 
 from warp_contact.usd import reader
 from warp_contact.usd.writer import UsdWriter
@@ -73,9 +73,6 @@ def test_an_error_of_usd_becomes_one_line_that_names_the_file(tmp_path):
 def test_options_of_a_writer_that_cannot_work_are_refused_before_anything_is_written(
     options, words, tmp_path
 ):
-    written(tmp_path / "run", 1)
-    before = sorted(tmp_path.rglob("*"))
     with pytest.raises(ValueError, match=words):
         UsdWriter(tmp_path / "run", FakeSimulation(), **options)
-    assert sorted(tmp_path.rglob("*")) == before
-    assert UsdGeom.Mesh.Get(reader.open_stage(tmp_path / "run"), "/World/left/surface")
+    assert list(tmp_path.iterdir()) == []

@@ -201,11 +201,8 @@ def chosen_camera(view, eye, target, low, high, aspect: float) -> Camera:
         eye, target = view
     fitting = fitting_camera(low, high, aspect)
     target = fitting.target if target is None else checks.numbers(target, (3,), "target")
-    away = fitting.eye - fitting.target
-    eye = target + away if eye is None else checks.numbers(eye, (3,), "eye")
-    if np.linalg.norm(eye - target) < checks.SMALLEST:
-        raise checks.refuse("eye", eye.tolist(), "another place than that of the target")
-    return Camera(eye, target)
+    eye = target + fitting.eye - fitting.target if eye is None else eye
+    return Camera(*checks.sight(eye, target))
 
 
 def fitting_camera(low: np.ndarray, high: np.ndarray, aspect: float) -> Camera:

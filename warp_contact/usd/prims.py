@@ -47,8 +47,10 @@ def check_options(sim, view, pressure_scale, flags: tuple) -> None:
         raise checks.refuse("sim", sim, "a wc.Simulation")
     if pressure_scale is not None:
         checks.positive(pressure_scale, "pressure_scale")
-    if view is not None and (not isinstance(view, tuple | list) or len(view) != 2):
-        raise checks.refuse("view", view, "eye and target, three numbers each")
+    if view is not None:
+        if not isinstance(view, tuple | list) or len(view) != 2:
+            raise checks.refuse("view", view, "eye and target, three numbers each")
+        checks.sight(*view)
     for name, value in zip(FLAGS, flags, strict=True):
         checks.flag(value, name)
 
@@ -244,10 +246,7 @@ def add_plane(stage, path: str, n: np.ndarray, h: float, x: np.ndarray, look) ->
 
 
 def add_camera(stage, eye, target) -> None:
-    """A camera at ``eye`` that looks at ``target`` [m]; raises ValueError for no direction."""
-    eye, target = (checks.numbers(p, (3,), n) for p, n in ((eye, "eye"), (target, "target")))
-    if np.linalg.norm(eye - target) < checks.SMALLEST:
-        raise checks.refuse("eye", eye.tolist(), "another place than that of the target")
+    """A camera at ``eye`` that looks at ``target``."""
     camera = UsdGeom.Camera.Define(stage, "/World/view")
     note(camera, "eye", Sdf.ValueTypeNames.Point3d, tuple(map(float, eye)))
     note(camera, "target", Sdf.ValueTypeNames.Point3d, tuple(map(float, target)))

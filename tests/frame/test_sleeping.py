@@ -241,6 +241,20 @@ def test_a_blow_that_is_passed_on_wakes_the_last_of_a_row(order):
     assert sim.measure().momentum[0] == pytest.approx(32.0, rel=1e-5)
 
 
+@pytest.mark.parametrize("ascending", [True, False])
+def test_a_push_at_one_end_of_a_row_wakes_it_to_the_other(ascending):
+    """Of blocks that touch: none is near enough to the first but the second."""
+    scene = Scene()
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    places = np.arange(5) * 0.1002
+    for x in places if ascending else places[::-1]:
+        scene.add_body(box(0.1, 2), RUBBER, (x, 0.0, 0.0502))
+    sim = settled(scene)
+    sim.set_velocity(0 if ascending else 4, (0.1, 0.0, 0.0))
+    run(sim, 1)
+    assert asleep(sim) == 0
+
+
 def test_a_buffer_that_grows_leaves_the_forces_of_those_asleep():
     sim = settled(tower(1))
     before = sim.measure().forces

@@ -184,7 +184,12 @@ def test_fixed_vertices_keep_their_velocity(rng, stages, find_contacts, records,
     assert not np.array_equal(v1[~held], v0[~held])
 
 
-def test_recorded_impulses_are_those_that_the_velocities_got(rng, stages, find_contacts, jittered):
+@pytest.mark.parametrize("most", [3, 48])
+def test_recorded_impulses_are_those_that_the_velocities_got(
+    rng, stages, find_contacts, jittered, monkeypatch, most
+):
+    """Also where the sweeps end before their time, with impulses extrapolated."""
+    monkeypatch.setattr(impulse, "SWEEPS", most)
     scene = meeting(rng, jittered, 0.5)
     unit = 1e-9
     model, state, work = stages(scene, dt=DT, unit=unit)

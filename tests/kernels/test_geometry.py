@@ -5,8 +5,9 @@ import pytest
 import warp as wp
 
 from warp_contact.kernels import geometry
+from warp_contact.kernels.broad_phase import edges
 
-N = 2000
+N = wp.constant(2000)
 # Inputs of order 1 in float32, conditioned by the filters below: errors of a few hundred roundings.
 TOL = 3e-5
 
@@ -45,6 +46,13 @@ def projected_weights(x: wp.array2d[wp.vec3], out: wp.array[wp.vec3]):
 def projected_crossing(x: wp.array2d[wp.vec3], out: wp.array[wp.vec2]):
     i = wp.tid()
     out[i] = geometry.projected_crossing(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i])
+
+
+@wp.kernel
+def gap_to(x: wp.array[wp.vec3], enough: float, out: wp.array[float]):
+    i = wp.tid()
+    t = wp.vec3i(2 * N + i, 3 * N + i, 4 * N + i)
+    out[i] = edges.gap_to(x[i], x[N + i], t, enough, x)
 
 
 def run(kernel, x: np.ndarray, dtype) -> np.ndarray:
@@ -201,3 +209,25 @@ def test_what_cannot_be_projected_gets_the_middle(n):
     np.testing.assert_allclose(run(projected_weights, x, wp.vec3), 1.0 / 3.0, rtol=1e-6)  # rounding
     parallel = np.array([a, b, c, (1.0, 1.0, 0.0), n])[:, None]
     np.testing.assert_array_equal(run(projected_crossing, parallel, wp.vec2), 0.5)
+
+
+def test_a_segment_and_a_triangle_that_are_apart_have_a_gap_no_larger_than_their_distance(rng):
+    x = points(rng, 5)
+    p, q, a, b, c = x
+    solvable, ref = reference_hits(np.array([p, q - p, a, b, c]))
+    v, w = ref[:, 1:].T
+    inside = np.min([ref[:, 0], 1.0 - ref[:, 0], v, w, 1.0 - v - w], axis=0)
+    gaps = wp.zeros(len(p), dtype=float)
+    flat = wp.array(x.reshape(-1, 3), dtype=wp.vec3)
+    for enough in (1e30, 0.1):  # then axes are left out once one has shown so much
+        wp.launch(gap_to, dim=len(p), inputs=[flat, enough], outputs=[gaps])
+        gap = gaps.numpy()[solvable]
+        crossed, apart = inside > 1e-2, inside < -1e-2
+        assert crossed.sum() > 20 and apart.sum() > 20
+        assert (gap[crossed] <= TOL).all() and (gap[apart] > 0.0).all()
+    along = np.linspace(0.0, 1.0, 11)[:, None, None]
+    on_segment = ((1.0 - along) * p + along * q)[:, solvable]
+    weights = np.array([(i, j, 10 - i - j) for i in range(11) for j in range(11 - i)]) / 10.0
+    on_triangle = np.einsum("kc,cni->kni", weights, x[2:, solvable])
+    near = np.min([np.linalg.norm(on_triangle - s, axis=2).min(axis=0) for s in on_segment], axis=0)
+    assert (gap[apart] <= near[apart] + TOL).all()

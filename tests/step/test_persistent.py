@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_contact import NeoHookean, Scene, Simulation, box
+from warp_contact import NeoHookean, Scene, Simulation, TetMesh, box
 from warp_contact.frame import stepper
-from warp_contact.step import impulse, narrow_phase, warm_start
+from warp_contact.step import broad_phase, impulse, narrow_phase, warm_start
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0, damping=2e-3)
 WEIGHT = 0.4 * 0.1 * 0.1 * 1000.0 * 9.81  # of a beam [N]
@@ -186,3 +186,26 @@ def test_places_are_counted_from_none_in_every_step(lying):
         work.narrow_phase.n_place.fill_(77)
         go_on(lying)
         assert work.narrow_phase.n_place.numpy()[0] == 0
+
+
+@pytest.mark.parametrize(("t", "goes_on"), [(0.2, True), (0.8, False)])
+def test_a_contact_with_a_face_ends_where_it_has_left_the_triangle(stages, t, goes_on):
+    """An edge that lies over both triangles of a top, with an impulse against the first."""
+    scene = Scene()
+    scene.add_body(box((2.0, 2.0, 1.0), 1), RUBBER)
+    x = [[-0.8, 0.1, 0.0], [0.8, 0.1, 0.0], [0.0, 0.3, 1.0], [0.0, -0.1, 1.0]]
+    scene.add_body(TetMesh(x, [[0, 1, 2, 3]]), RUBBER, (0.0, 0.0, 0.5 + 1e-4))
+    model, state, work = stages(scene)
+    at, tris = state.x.numpy().astype(float), model.tris.numpy()
+    first = np.flatnonzero((at[tris[:12], 2] > 0.4).all(axis=1))[:2]
+    middle = at[tris[first], 0].mean(axis=1)
+    edge = np.flatnonzero((model.edges.numpy()[:, :2] == [8, 9]).all(axis=1))
+    kept = work.warm.edges.numpy()
+    kept["edge"][0], kept["body"][0], kept["t"][0] = edge[0], 0, t
+    kept["vert"][0], kept["n"][0] = tris[first[middle.argmin()]], (0.0, 0.0, 1.0)
+    kept["kept"][0] = 0.0, 0.0, 0.0, 1.0
+    work.warm.edges.assign(kept)
+    work.warm.n_edge.fill_(1)
+    broad_phase.refresh(model, state.x, state.x, work)
+    narrow_phase.continue_edges(model, state.x, work)
+    assert (work.narrow_phase.place.numpy() >= 0).any() == goes_on

@@ -128,7 +128,8 @@ def test_what_was_moved_away_is_forgotten(lying, way):
     assert len(go_on(lying)["impulse"]) == 0
     before = lying.measure().momentum[2]
     lying.step_frame()
-    assert lying.measure().forces == {}
+    assert lying.measure().forces == {} and lying.measure().n_contacts == 0
+    assert (lying.contact_fields()["partner"] == -1).all()
     # float32, over some tens of steps
     assert lying.measure().momentum[2] - before == pytest.approx(-WEIGHT / lying.fps, rel=1e-4)
     assert len(kept(lying)) == 0
@@ -188,24 +189,33 @@ def test_places_are_counted_from_none_in_every_step(lying):
         assert work.narrow_phase.n_place.numpy()[0] == 0
 
 
+@pytest.mark.parametrize("beside", [False, True])
 @pytest.mark.parametrize(("t", "goes_on"), [(0.2, True), (0.8, False)])
-def test_a_contact_with_a_face_ends_where_it_has_left_the_triangle(stages, t, goes_on):
+def test_a_contact_with_a_face_ends_where_it_has_left_the_triangle(stages, t, goes_on, beside):
     """An edge that lies over both triangles of a top, with an impulse against the first."""
     scene = Scene()
-    scene.add_body(box((2.0, 2.0, 1.0), 1), RUBBER)
+    if beside:  # the edge is near another body too, which comes before
+        scene.add_body(box(0.2, 1), RUBBER, (0.8, -0.0002, 0.6003))
+    body = scene.add_body(box((2.0, 2.0, 1.0), 1), RUBBER).index
     x = [[-0.8, 0.1, 0.0], [0.8, 0.1, 0.0], [0.0, 0.3, 1.0], [0.0, -0.1, 1.0]]
     scene.add_body(TetMesh(x, [[0, 1, 2, 3]]), RUBBER, (0.0, 0.0, 0.5 + 1e-4))
     model, state, work = stages(scene)
     at, tris = state.x.numpy().astype(float), model.tris.numpy()
-    first = np.flatnonzero((at[tris[:12], 2] > 0.4).all(axis=1))[:2]
-    middle = at[tris[first], 0].mean(axis=1)
-    edge = np.flatnonzero((model.edges.numpy()[:, :2] == [8, 9]).all(axis=1))
+    of_body = np.flatnonzero(model.tri_body.numpy() == body)
+    top = of_body[(at[tris[of_body], 2] > 0.4).all(axis=1)]
+    first = model.n_vert - 4
+    edge = np.flatnonzero((model.edges.numpy()[:, :2] == [first, first + 1]).all(axis=1))
     kept = work.warm.edges.numpy()
-    kept["edge"][0], kept["body"][0], kept["t"][0] = edge[0], 0, t
-    kept["vert"][0], kept["n"][0] = tris[first[middle.argmin()]], (0.0, 0.0, 1.0)
-    kept["kept"][0] = 0.0, 0.0, 0.0, 1.0
+    kept["edge"][0], kept["body"][0], kept["t"][0] = edge[0], body, t
+    kept["vert"][0] = tris[top[at[tris[top], 0].mean(axis=1).argmin()]]
+    kept["n"][0], kept["kept"][0] = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0)
     work.warm.edges.assign(kept)
     work.warm.n_edge.fill_(1)
     broad_phase.refresh(model, state.x, state.x, work)
+    pairs = work.broad_phase.edges.list
+    bodies = pairs.pair.numpy()[slice(*pairs.start.numpy()[edge[0] : edge[0] + 2])][:, 1]
+    assert bodies.tolist() == list(range(body + 1))
     narrow_phase.continue_edges(model, state.x, work)
-    assert (work.narrow_phase.place.numpy() >= 0).any() == goes_on
+    place = work.narrow_phase.place.numpy()[: work.broad_phase.edges.n.numpy()[0]]
+    going = pairs.pair.numpy()[: len(place)][place >= 0].tolist()
+    assert going == ([[edge[0], body]] if goes_on else [])

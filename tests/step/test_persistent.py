@@ -128,11 +128,20 @@ def test_what_was_moved_away_is_forgotten(lying, way):
     assert len(go_on(lying)["impulse"]) == 0
     before = lying.measure().momentum[2]
     lying.step_frame()
-    assert lying.measure().forces == {} and lying.measure().n_contacts == 0
-    assert (lying.contact_fields()["partner"] == -1).all()
+    assert lying.measure().forces == {}
     # float32, over some tens of steps
     assert lying.measure().momentum[2] - before == pytest.approx(-WEIGHT / lying.fps, rel=1e-4)
     assert len(kept(lying)) == 0
+
+
+def test_what_has_parted_counts_no_contacts(lying):
+    assert lying.measure().n_contacts > 0
+    x = lying.positions()
+    x[slice(*lying.model.body_vert.numpy()[1:3]), 2] += np.float32(0.5)  # nothing is near
+    lying.state.x.assign(x)
+    lying.step_frame()
+    assert lying.measure().n_contacts == 0
+    assert (lying.contact_fields()["partner"] == -1).all()
 
 
 def test_without_an_impulse_a_contact_does_not_go_on(lying):

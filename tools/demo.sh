@@ -7,8 +7,8 @@ set -- render
 . tools/venv.sh
 
 echo "simulating 60 frames of the bowl (the first run compiles the kernels, about half a minute)"
-.venv/bin/warp-contact run bowl --frames 60 --out out/bowl >/dev/null # progress: stderr
-.venv/bin/warp-contact render out/bowl --frames=-1 --quiet
-echo "USD      $PWD/out/bowl/bowl.usda"
-echo "metrics  $PWD/out/bowl/metrics.jsonl"
-echo "picture  $PWD/out/bowl/pictures/000060.png"
+.venv/bin/warp-contact run bowl --frames 60 --out out/demo --overwrite >/dev/null # progress: stderr
+.venv/bin/warp-contact render out/demo --frames=-1 --quiet
+echo "USD      $PWD/out/demo/demo.usda"
+echo "metrics  $PWD/out/demo/metrics.jsonl"
+echo "picture  $PWD/out/demo/pictures/000060.png"

@@ -23,6 +23,10 @@ class Progress:
         self.start = self.written = time.monotonic()
         self._write(f"frame 0/{n_frames}")
 
+    def expect(self, steps: int) -> None:
+        """Say how many steps the first frame will take: it may last."""
+        self._write(f"frame 0/{self.n_frames}  {steps} steps a frame")
+
     def update(self, sim, measured) -> None:
         """Count a finished frame of a simulation, and what was measured of it."""
         self.done += 1

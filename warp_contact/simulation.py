@@ -105,12 +105,23 @@ class Simulation:
 
     def _frames(self, n: int, progress: bool) -> Iterator[int]:
         with Progress(n, quiet=not progress) as line:
+            if progress:
+                line.expect(self.next_substeps())
             for _ in range(n):
                 self.step_frame()
                 if progress:
                     measured = self.measure()
                     line.update(self, measured)
                 yield self.frame
+
+    def next_substeps(self) -> int:
+        """Steps that the next frame takes, unless they prove too long on the way.
+
+        Raises:
+            SimulationError: as ``frames``
+        """
+        with exclusively(self.device):
+            return self._stepper.foresee(self.frame + 1)
 
     def step_frame(self) -> None:
         """Step one frame.

@@ -21,6 +21,20 @@ wp.set_module_options(OPTIONS)
 BREAKDOWN = wp.constant(wp.float64(1.0e-10))  # b^2 / a^2 at which float32 vectors are rounding
 
 
+@wp.func
+def in_double(y: wp.vec3) -> wp.vec3d:
+    return wp.vec3d(wp.float64(y[0]), wp.float64(y[1]), wp.float64(y[2]))
+
+
+@wp.func
+def mass_product(m: float, x: wp.vec3, y: wp.vec3) -> wp.float64:
+    """M x . y, in double precision where it is too large for a float32: small, stiff bodies."""
+    p = m * wp.dot(x, y)
+    if wp.isfinite(p):
+        return wp.float64(p)
+    return wp.float64(m) * wp.dot(in_double(x), in_double(y))
+
+
 @wp.kernel
 def restart(
     # in
@@ -60,19 +74,9 @@ def multiply(
     s = wp.float64(0.0)
     for i in range(chunk[k], chunk[k + 1]):
         y = inv_mass[i] * motion.corner_sum(i, vt_start, vt_corner, f_tet)
-        s += wp.float64(mass[i] * wp.dot(basis[j, i], y))
+        s += mass_product(mass[i], basis[j, i], y)
         basis[j + 1, i] = y
     part[k] = s
-
-
-@wp.func
-def mass_norm2(m: float, y: wp.vec3) -> wp.float64:
-    """M y . y, in double precision where it is too large for a float32: small, stiff bodies."""
-    p = m * wp.dot(y, y)
-    if wp.isfinite(p):
-        return wp.float64(p)
-    z = wp.vec3d(wp.float64(y[0]), wp.float64(y[1]), wp.float64(y[2]))
-    return wp.float64(m) * wp.dot(z, z)
 
 
 @wp.kernel
@@ -98,7 +102,7 @@ def orthogonalise(
             y -= float(coef[2 * j + 1, b]) * basis[j, i]
         if j > 0:
             y -= float(wp.sqrt(coef[2 * j, b])) * basis[j - 1, i]
-        s += mass_norm2(mass[i], y)
+        s += mass_product(mass[i], y, y)
         basis[j + 1, i] = y
     part[k] = s
 

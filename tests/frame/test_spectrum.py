@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_contact import Scene, Simulation
+from warp_contact import Scene, Simulation, SimulationError
 from warp_contact import box as block
 from warp_contact.frame.spectrum import Spectrum
 from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork
@@ -251,3 +251,10 @@ def test_small_and_stiff_bodies_have_the_frequencies_of_large_ones(size):
     for sim in scenes:
         sim.step_frame()
     assert scenes[0].substeps == scenes[1].substeps
+
+
+def test_tiny_stiff_and_light_bodies_are_slow_to_step_not_flat():
+    scene = Scene()
+    scene.add_body(block(2e-6, 2), NeoHookean(1e10, 0.4999, 0.2), label="mote")
+    with pytest.raises(SimulationError, match=r"needs \d+ substeps.* body 'mote' vibrates at"):
+        Simulation(scene).step_frame()

@@ -7,7 +7,7 @@ import warp as wp
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import allocate_work
-from warp_contact.frame import stepper
+from warp_contact.frame import step_bounds, stepper
 from warp_contact.frame.buffers import Buffers
 
 DRY = NeoHookean(1e5, 0.3, 1000.0)  # without damping
@@ -247,7 +247,7 @@ def test_a_frame_that_explodes_is_repeated_before_its_buffers_grow(looks, monkey
     sim = Simulation(scene)
     tight = allocate_work(sim.model, sim.state, Capacity(contacts=1, verts=1, edges=1))
     sim._stepper.buffers.use(tight)
-    done, raised, replaced = [], stepper.raised, Buffers.replace
+    done, raised, replaced = [], step_bounds.raised, Buffers.replace
 
     def remember(name, function):
         def call(*arguments):
@@ -256,7 +256,7 @@ def test_a_frame_that_explodes_is_repeated_before_its_buffers_grow(looks, monkey
 
         return call
 
-    monkeypatch.setattr(stepper, "raised", remember("repeat", raised))
+    monkeypatch.setattr(step_bounds, "raised", remember("repeat", raised))
     monkeypatch.setattr(stepper, "overlaps", lambda *_: False)
     monkeypatch.setattr(Buffers, "replace", remember("grow", replaced))
     looks(sim, 1000, lambda found: (100.0 * found[0], found[1]))  # as if it had exploded

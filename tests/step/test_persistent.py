@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, TetMesh, box
-from warp_contact.frame import stepper
+from warp_contact.frame import step_bounds
 from warp_contact.step import broad_phase, impulse, narrow_phase, warm_start
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0, damping=2e-3)
@@ -158,8 +158,8 @@ def test_a_frame_that_is_repeated_starts_from_the_same_impulses(lying, tmp_path,
     once.load(tmp_path / "run.npz")
     once.step_frame()
     results = iter((False, True))
-    monkeypatch.setattr(stepper, "stays_stable", lambda *_: next(results))
-    monkeypatch.setattr(stepper, "raised", lambda before, after: before)
+    monkeypatch.setattr(step_bounds, "stays_stable", lambda *_: next(results))
+    monkeypatch.setattr(step_bounds, "raised", lambda before, after: before)
     lying.step_frame()
     assert next(results, None) is None
     np.testing.assert_array_equal(lying.positions(), once.positions())

@@ -94,6 +94,8 @@ def take_frames(sim: Simulation, n: int, writer: UsdWriter, args) -> None:
     """Step to frame ``n``, write each frame, and a checkpoint now and then."""
     folder, left = writer.folder, max(0, n - sim.frame)
     with Progress(left, args.quiet) as line:
+        if left:
+            line.expect(sim.next_substeps())
         if not args.resume:  # all of it appears together, over another run not before frame 1
             text = line_of(sim, sim.measure())
             append(folder.now / METRICS, text)

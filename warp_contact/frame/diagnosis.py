@@ -29,3 +29,11 @@ def flattest_tet(model: Model, x: wp.array) -> str:
     k = int((volume / np.maximum(np.max(area, axis=0), 1e-30)).argmin())
     body = int(model.vert_body.numpy()[model.tets.numpy()[k, 0]])
     return f"body '{model.labels[body]}', tet {k - int(model.body_tet.numpy()[body])}"
+
+
+def too_damped(model: Model, of_bodies: np.ndarray, dt: np.ndarray) -> str:
+    """Why no step ``dt`` [s] can take such damping rates of bodies [1/s], shape (n_body,)."""
+    body = int(of_bodies.argmax())
+    fast = f"motion within body '{model.labels[body]}' decays at up to {of_bodies[body]:.3g} 1/s"
+    remedy = "check its damping [s] and its tets"
+    return f"{fast}, too fast for a step of {dt.max():.3g} s: {remedy}"

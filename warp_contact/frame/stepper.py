@@ -11,25 +11,17 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.errors import SimulationError
-from warp_contact.frame import between, memory
+from warp_contact.frame import between, memory, step_bounds
 from warp_contact.frame.buffers import Buffers
 from warp_contact.frame.capacity import enlarged
 from warp_contact.frame.damping import prepare, stages_for
-from warp_contact.frame.diagnosis import lost_vertex
+from warp_contact.frame.diagnosis import lost_vertex, too_damped
 from warp_contact.frame.frame_start import FrameStart
 from warp_contact.frame.last_frame import LastFrame, none_yet
 from warp_contact.frame.overlap import overlaps
 from warp_contact.frame.rates import rates_now
 from warp_contact.frame.sleeping import Sleeping
 from warp_contact.frame.spectrum import Spectrum
-from warp_contact.frame.step_bounds import (
-    CUT_SHORT,
-    RAISED,
-    raised,
-    served,
-    stays_damped,
-    stays_stable,
-)
 from warp_contact.frame.step_count import StepCount
 from warp_contact.frame.turns import Turns, segments
 from warp_contact.frame.worlds import Worlds
@@ -112,6 +104,20 @@ class Stepper:
         old = overlapping and bool(self.work.surface.was_old.numpy()[0])
         self.last = LastFrame(self._n, self._dt, rates, old)
 
+    def foresee(self, frame: int) -> int:
+        """Steps that frame number ``frame`` will take if none proves too long."""
+        rates = self._rates()
+        self._step_count.check(self._state, rates[0], frame)
+        return int(self._steps(rates, self.last, frame).max())
+
+    def _rates(self) -> np.ndarray:
+        rates = self.last.rates
+        return self.spectrum.rates(self._state.x) if rates is None else rates
+
+    def _steps(self, rates: np.ndarray, last: LastFrame, frame: int) -> np.ndarray:
+        of_bodies = self.spectrum.of_bodies[0]
+        return self._step_count.steps(self._state, of_bodies, rates[0], last, frame)
+
     def _all_sleep(self) -> bool:
         """Decide which bodies sleep; where all do, nothing moves in this frame."""
         # An overlap that is left has to be searched.
@@ -124,8 +130,7 @@ class Stepper:
 
     def _find_step(self, frame: int) -> np.ndarray:
         """Step the frame until its steps fit; return the last rates [1/s], (2, n_world)."""
-        rates = self.last.rates
-        rates = self.spectrum.rates(self._state.x) if rates is None else rates
+        rates = self._rates()
         self._step_count.check(self._state, rates[0], frame)
         halved = 0
         in_parts = self._flat()
@@ -149,10 +154,12 @@ class Stepper:
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
                     raise SimulationError(f"frame {frame}: {wrong} ({self._n.max()} substeps)")
                 halved += 1
-                rates = 2.0 * np.stack([np.maximum(rates[0], served(self._dt)), rates[1]])
+                rates = 2.0 * np.stack(
+                    [np.maximum(rates[0], step_bounds.served(self._dt)), rates[1]]
+                )
             elif not good:
-                least = CUT_SHORT if in_parts else RAISED
-                rates = np.where(fits, rates, raised(rates, after, self._dt, least))
+                least = step_bounds.CUT_SHORT if in_parts else step_bounds.RAISED
+                rates = np.where(fits, rates, step_bounds.raised(rates, after, self._dt, least))
             in_parts = flat
         raise SimulationError(f"frame {frame}: no stable step found ({self._n.max()} substeps)")
 
@@ -162,8 +169,8 @@ class Stepper:
 
     def _fit(self, rates: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Worlds whose steps, chosen for ``rates`` [1/s], fit the rates ``after`` them."""
-        stable = self.wanted is not None or stays_stable(self._dt, after[0])
-        return stable & stays_damped(self._dt, rates[1], after[1])
+        stable = self.wanted is not None or step_bounds.stays_stable(self._dt, after[0])
+        return stable & step_bounds.stays_damped(self._dt, rates[1], after[1])
 
     def velocities(self) -> np.ndarray:
         """Velocities [m/s] at the time of the positions, shape (n_vert, 3)."""
@@ -249,11 +256,11 @@ class Stepper:
         else:
             contact_forces.clear(work.forces)
         now = replace(self.last, overlapping=self._overlapping)
-        given = self.spectrum.of_bodies[0], rates[0], now, frame
-        self._n = self._step_count.steps(self._state, *given)
+        self._n = self._steps(rates, now, frame)
         self._dt = 1.0 / (self.fps * self._n)
         if work.damping and stages_for(rates[1], self._dt) > MOST:
-            raise SimulationError(f"frame {frame}: {self._too_damped(rates[1])}")
+            wrong = too_damped(self._model, self.spectrum.of_bodies[1], self._dt)
+            raise SimulationError(f"frame {frame}: {wrong}")
         damping_stages = prepare(work.damping, rates[1], self._dt, of_vert, self.last.dt)
         lag = 0.5 * (self.last.dt - self._dt)[of_vert]
         shift_velocities(self._model, self._state, work, work.awake, lag)
@@ -272,13 +279,6 @@ class Stepper:
             if wrong or not self._fit(rates, after).all() or enlarged(work) is not None:
                 break
         return after, wrong
-
-    def _too_damped(self, rates: np.ndarray) -> str:
-        """Why no step can take such damping ``rates`` [1/s], shape (n_world,)."""
-        label = self._model.labels[int(self.spectrum.of_bodies[1].argmax())]
-        fast = f"decays at up to {rates.max():.3g} 1/s"
-        step = f"too fast for a step of {self._dt.max():.3g} s: check its damping [s] and its tets"
-        return f"motion within body '{label}' {fast}, {step}"
 
     def _begin(self) -> None:
         """Keep what a frame changes."""

@@ -97,6 +97,18 @@ def test_a_velocity_that_is_given_wakes_up_and_a_slow_press_is_not_stopped():
     assert asleep(sim) == 1
 
 
+def test_a_velocity_wakes_its_body_however_small_it_is():
+    """In steps so short that the weight of half of one is no motion either."""
+    sim = Simulation(tower(1), sleeping=True, substeps=100)
+    for _ in sim.frames(120):
+        if asleep(sim) == 2:
+            break
+    assert asleep(sim) == 2
+    sim.set_velocity(0, (0.0, 0.0, 1e-9))
+    run(sim, 1)
+    assert asleep(sim) == 1
+
+
 def test_without_weight_nothing_sleeps():
     floating = Scene(gravity=(0.0, 0.0, 0.0))
     floating.add_body(box(0.1, 2), RUBBER, velocity=(1e-5, 0.0, 0.0))

@@ -48,8 +48,11 @@ def test_a_penalty_adds_the_highest_frequency_of_masses_that_it_joins_in_a_row()
     shift = np.roll(np.eye(8), 1, axis=0)
     ring = stiffness / mass * (2.0 * np.eye(8) - shift - shift.T)
     highest = math.sqrt(np.linalg.eigvalsh(ring)[-1])
-    assert step_bounds.with_penalty(0.0, stiffness, 1.0 / mass) == pytest.approx(highest)
-    assert step_bounds.with_penalty(OMEGA, stiffness, 0.0) == OMEGA
+    assert step_bounds.with_penalty(0.0, stiffness, 0.0, 1.0 / mass) == pytest.approx(highest)
+    assert step_bounds.with_penalty(OMEGA, stiffness, 9.0, 0.0) == OMEGA
+    # A step below half of 1 / (damping inv_mass).
+    dt = 2.0 * step_bounds.SAFETY / step_bounds.with_penalty(0.0, 1e-3, 50.0, 1.0 / mass)
+    assert dt * 50.0 / mass == pytest.approx(0.6)
 
 
 def test_a_step_is_refused_before_it_is_unstable():

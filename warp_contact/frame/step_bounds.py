@@ -55,9 +55,13 @@ def steps_in_frame(per_second, fps: float, last):
     return np.maximum(np.maximum(1, kept), np.ceil(per_second / fps)).astype(int)
 
 
-def with_penalty(omega, stiffness: float, inv_mass):
-    """Frequency [1/s] with a penalty [N/m] on the lightest vertex, of ``inv_mass`` [1/kg]."""
-    return np.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
+def with_penalty(omega, stiffness: float, damping: float, inv_mass):
+    """Frequency [1/s] with a penalty [N/m], [N s/m] on the lightest vertex, of ``inv_mass`` [1/kg].
+
+    Its damping is explicit: it would turn a velocity round in steps above 1 / (damping inv_mass).
+    """
+    vibrates = np.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
+    return np.maximum(vibrates, 2.0 * damping * inv_mass)
 
 
 def stays_stable(dt, omega):

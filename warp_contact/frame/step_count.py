@@ -81,8 +81,8 @@ class StepCount:
     def _of_stiffness(self, state: State, body: int, omega: float) -> str:
         """Why a step is short, and what to do, where vibrations limit it."""
         if isinstance(self._response, Penalty):
-            stiffness = self._response.stiffness
-            return f"a penalty of {stiffness:g} N/m is too stiff for the lightest vertex"
+            given = f"{self._response.stiffness:g} N/m, {self._response.damping:g} N s/m"
+            return f"a penalty of {given} is too stiff for the lightest vertex"
         name = f"body '{self._model.labels[body]}'"
         flattest = f"the flattest tet is {flattest_tet(self._model, state.x)}"
         remedy = "check density [kg/m^3], modulus [Pa], size [m] and tets, or raise max_substeps"
@@ -120,7 +120,8 @@ class StepCount:
     def _with_response(self, omega: np.ndarray) -> np.ndarray:
         """The frequencies [1/s] of the elastic forces, or those of a penalty with them."""
         if isinstance(self._response, Penalty):
-            return step_bounds.with_penalty(omega, self._response.stiffness, self._largest_inv_mass)
+            given = self._response.stiffness, self._response.damping, self._largest_inv_mass
+            return step_bounds.with_penalty(omega, *given)
         return omega
 
     def _speed(self, state: State) -> np.ndarray:

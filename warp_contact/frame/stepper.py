@@ -106,9 +106,7 @@ class Stepper:
 
     def foresee(self, frame: int) -> int:
         """Steps that frame number ``frame`` will take if none proves too long."""
-        rates = self._rates()
-        self._step_count.check(self._state, rates[0], frame)
-        return int(self._steps(rates, self.last, frame).max())
+        return int(self._steps(self._rates(), self.last, frame).max())
 
     def _rates(self) -> np.ndarray:
         rates = self.last.rates
@@ -161,7 +159,8 @@ class Stepper:
                 least = step_bounds.CUT_SHORT if in_parts else step_bounds.RAISED
                 rates = np.where(fits, rates, step_bounds.raised(rates, after, self._dt, least))
             in_parts = flat
-        raise SimulationError(f"frame {frame}: no stable step found ({self._n.max()} substeps)")
+        stiffest = self._model.labels[int(self.spectrum.of_bodies[0].argmax())]
+        raise SimulationError(f"frame {frame}: no step is stable, not for body '{stiffest}'")
 
     def _flat(self) -> bool:
         """Whether a tet was flat at the last check, and the number of steps is free."""
@@ -169,8 +168,8 @@ class Stepper:
 
     def _fit(self, rates: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Worlds whose steps, chosen for ``rates`` [1/s], fit the rates ``after`` them."""
-        stable = self.wanted is not None or step_bounds.stays_stable(self._dt, after[0])
-        return stable & step_bounds.stays_damped(self._dt, rates[1], after[1])
+        damped = step_bounds.stays_damped(self._dt, rates[1], after[1])
+        return damped if self.wanted else damped & step_bounds.stays_stable(self._dt, after[0])
 
     def velocities(self) -> np.ndarray:
         """Velocities [m/s] at the time of the positions, shape (n_vert, 3)."""

@@ -1,8 +1,8 @@
 """All lengths that are parts of a mean edge, in one table, with the reason of each.
 
 Tolerances of contact depend on the mesh: a length that is negligible on a coarse body is not on a
-fine one. All are parts [-] of the mean edge of a body, or of the shortest one of the scene where it
-says so.
+fine one. All are parts [-] of the mean edge of a body, or of the shortest one of its world
+where it says so.
 """
 
 import warp as wp
@@ -11,6 +11,7 @@ import warp as wp
 FLUSH = wp.constant(1.0e-5)  # a vertex this deep lies in the surface
 BOX_GROWTH = wp.constant(1.0e-5)  # rays must not miss the box of a flat triangle
 IMPULSE_TOLERANCE = wp.constant(1.0e-5)  # a smaller approach in a step is left to the closure
+NEGLIGIBLE = wp.constant(0.1 * 1.0e-5)  # of the shortest edge: less does not affect other contacts
 CLOSURE_TOLERANCE = wp.constant(1.0e-4)  # a smaller overlap is left to the resting gap
 REST_GAP = wp.constant(2.0e-4)  # resting gap: rounding does not decide which vertex is inside
 FLUSH_EDGE = wp.constant(2.0e-4)  # an edge this deep lies in the face, whatever its direction

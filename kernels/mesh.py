@@ -15,7 +15,6 @@ wp.set_module_options(OPTIONS)
 class Mesh:
     """The meshes of all bodies, and the half-spaces."""
 
-    shortest_edge: float  # shortest mean edge of a body [m]
     n_body: int  # a body m >= n_body is half-space m - n_body
     bvh: wp.uint64  # Bvh over the triangles, grouped by body
     tets: wp.array[wp.vec4i]  # (n_tet,)
@@ -26,6 +25,7 @@ class Mesh:
     on_surface: wp.array[int]  # (n_vert,)
     body_vert: wp.array[int]  # (n_body + 1,) first vertex of each body
     body_edge: wp.array[float]  # (n_body,) mean edge [m]
+    shortest_edge: wp.array[float]  # (n_body,) shortest mean edge of a body of the same world [m]
     vs_start: wp.array[int]  # (n_vert + 1,) first entry of each vertex in vs_tri
     vs_tri: wp.array[int]  # (3 n_tri,) surface triangles at each vertex
     vn_start: wp.array[int]  # (n_vert + 1,) first entry of each vertex in vn_vert

@@ -35,7 +35,7 @@ MAY = {  # room: those that it may import, beside itself
 }
 LADDER = (  # of the kernel rooms: each may import those before it
     {"options"},
-    {"geometry", "lengths", "mesh", "mobility", "scan", "sorting"},
+    {"geometry", "lengths", "mesh", "mobility", "scan", "sorting", "worlds"},
     {"elastic"},
     {"motion"},
     {"broad_phase"},

@@ -10,11 +10,12 @@ New pairs are also found when a body moves further than FASTER reserves in a ste
     free    = max(looks d, LEAST_SKIN e / 2) + D / 2     [m]
     reserve = max(d, LEAST_SKIN e / 2) + D / 2           [m]     skin = free + reserve
 
-d is the largest motion of the body in a step, D that of the bodies near it, e the shortest edge.
-``looks`` is the number of steps that the pairs should last. It is the same for all bodies, and such
-that looks d is MEAN_SKIN edges on average. A few fast bodies then do not use up the pairs of a pile
-at rest, and skins stay narrow where all bodies are fast. A vibrating body stays near its place, so
-its pairs last longer. A body with nothing near it, even with LONGEST for all, gets LONGEST.
+d is the largest motion of the body in a step, D that of the bodies near it, e the shortest edge of
+its world. ``looks`` is the number of steps that the pairs should last. It is the same for all
+bodies, and such that looks d is MEAN_SKIN edges on average. A few fast
+bodies then do not use up the pairs of a pile at rest, and skins stay narrow where all bodies are
+fast. A vibrating body stays near its place, so its pairs last longer. A body with nothing near it,
+even with LONGEST for all, gets LONGEST.
 
 Most pairs are not close to touching. A pair that is some distance apart is left alone until its two
 bodies together have travelled that distance. A body travels the sum of its largest motions from one
@@ -87,7 +88,7 @@ def find_motion(
 @wp.kernel
 def find_fastest(
     # in
-    edge: float,  # shortest mean edge of a body [m]
+    edge: wp.array[float],  # (n_body,) shortest of the world [m]
     motion: wp.array[float],  # (n_body,) [m]
     # out, added to
     fastest: wp.array[float],  # (1,) [m]
@@ -96,7 +97,7 @@ def find_fastest(
     """One thread per body: the motion of the fastest, and the sum of all motions."""
     m = wp.tid()
     wp.atomic_max(fastest, 0, motion[m])
-    wp.atomic_add(total, 0, int(MOTION_UNIT * wp.min(motion[m] / edge, 1.0)))
+    wp.atomic_add(total, 0, int(MOTION_UNIT * wp.min(motion[m] / edge[m], 1.0)))
 
 
 @wp.func
@@ -114,7 +115,7 @@ def of_motion(motion: float, edge: float, times: float) -> float:
 @wp.kernel
 def widest_skins(
     # in
-    edge: float,  # shortest mean edge of a body [m]
+    edge: wp.array[float],  # (n_body,) shortest of the world [m]
     fastest: wp.array[float],  # (1,) [m]
     motion: wp.array[float],  # (n_body,) [m]
     # out
@@ -122,7 +123,7 @@ def widest_skins(
 ):
     """One thread per body: the widest skin that it may get."""
     m = wp.tid()
-    own = of_motion(motion[m], edge, LONGEST) + of_motion(motion[m], edge, 1.0)
+    own = of_motion(motion[m], edge[m], LONGEST) + of_motion(motion[m], edge[m], 1.0)
     skin[m] = own + fastest[0]
 
 
@@ -135,18 +136,18 @@ def spare(m: int, looks: float, edge: float, motion: wp.array[float]) -> wp.vec3
 
 @wp.func
 def meet_within(
-    m: int, other: int, looks: float, edge: float, motion: wp.array[float], of: Near
+    m: int, other: int, looks: float, edge: wp.array[float], motion: wp.array[float], of: Near
 ) -> bool:
     """Whether the boxes of two bodies meet with skins for so many steps."""
-    a = spare(m, looks, edge, motion)
-    b = spare(other, looks, edge, motion)
+    a = spare(m, looks, edge[m], motion)
+    b = spare(other, looks, edge[other], motion)
     return boxes_meet(of.lower[m] + a, of.upper[m] - a, of.lower[other] + b, of.upper[other] - b)
 
 
 @wp.kernel
 def choose_skins(
     # in
-    edge: float,  # shortest mean edge of a body [m]
+    edge: wp.array[float],  # (n_body,) shortest of the world [m]
     total: wp.array[int],  # (1,) sum of the motions
     motion: wp.array[float],  # (n_body,) [m]
     of: Near,  # with the widest skins
@@ -174,8 +175,8 @@ def choose_skins(
                 push = wp.max(push, motion[other])
     if of.n_near[m] == 0:
         looks = LONGEST
-    free[m] = of_motion(motion[m], edge, looks) + 0.5 * push
-    skin[m] = free[m] + of_motion(motion[m], edge, 1.0) + 0.5 * push
+    free[m] = of_motion(motion[m], edge[m], looks) + 0.5 * push
+    skin[m] = free[m] + of_motion(motion[m], edge[m], 1.0) + 0.5 * push
     stale[0] = 0
     any_pair[0] = 0
 
@@ -187,12 +188,14 @@ def add_motion(
     recent: wp.array[float],  # (n_body,) [m] largest of the last motions, older ones count less
     travelled: wp.array[float],  # (n_body + n_plane,) [m]
     # out
-    n_new: wp.array[int],  # (1,) 0: the new contacts of edges are counted from here on
+    found: wp.array[int],  # (1 + n_world,) 0: new contacts of edges are counted from here on
 ):
     """One thread per body: add its motion to the distance that it has travelled."""
     m = wp.tid()
     if m == 0:
-        n_new[0] = 0
+        found[0] = 0
+    if m + 1 < found.shape[0]:  # there are no more worlds than bodies
+        found[m + 1] = 0
     travelled[m] = travelled[m] + motion[m]
     recent[m] = wp.max(motion[m], FADING * recent[m])
     motion[m] = 0.0

@@ -14,8 +14,9 @@ momentum is kept exactly. A fixed vertex has 1 / m = 0 and keeps its prescribed 
 
 Sweep j starts from impulses extrapolated by (j - 1) / (j + 2) of the last change, as in Nesterov's
 method, except at contacts where that change went too far. The last sweep is a plain one. Most
-contacts converge soon, a few clusters late. Between the first and the last sweep a contact is left
-alone while neither its impulses nor the velocities of its vertices change.
+contacts converge soon, a few clusters late. Between the first and the last sweep of a world
+(worlds.py) a contact is left alone while neither its impulses nor the velocities of its vertices
+change.
 """
 
 import warp as wp
@@ -26,6 +27,7 @@ from warp_contact.kernels.mobility import Mobility, mobility_of
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, takes_part, total
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import DONE, LAST, Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -35,25 +37,8 @@ class Limits:
     """When the sweeps end."""
 
     tolerance: float  # of an edge: approach in a step that needs another sweep
-    negligible: float  # [m] a smaller change in a step is negligible for other contacts
     sweeps: int  # at most
     extrapolation: float  # 1, or 0 for plain sweeps
-
-
-@wp.kernel
-def next_sweep(
-    # in
-    first: bool,
-    # out
-    again: wp.array[int],  # (1,) 0
-    # in, out
-    sweep: wp.array[int],  # (1,) number of this sweep
-):
-    """One thread: count a sweep."""
-    again[0] = 0
-    if first:
-        sweep[0] = 0
-    sweep[0] = sweep[0] + 1
 
 
 @wp.func
@@ -82,8 +67,6 @@ def solve_contacts(
     # in
     threads: int,
     limits: Limits,
-    last: bool,  # do not extrapolate the impulses after this sweep
-    sweep_number: wp.array[int],  # (1,)
     dt: wp.array[float],  # (n_vert,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -97,13 +80,17 @@ def solve_contacts(
     part: wp.array[wp.vec3],  # (5 capacity,) [N s] what this sweep adds at each vertex
     served: wp.array[int],  # (n_vert,) this sweep where it adds something
     # out, added to
-    again: wp.array[int],  # (1,) 1 when another sweep is needed
+    worlds: Worlds,  # those that need another sweep
 ):
-    """For each contact: update its accumulated impulses."""
-    sweep = sweep_number[0]
-    whole = last or sweep == 1
+    """For each contact of a world that sweeps: update its accumulated impulses."""
+    sweep = worlds.sweep[0]
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
+        world = worlds.of_vert[at.vert[0]]
+        if worlds.doing[world] == DONE:
+            continue
+        last = worlds.doing[world] == LAST  # do not extrapolate the impulses after it
+        whole = last or sweep == 1
         if not whole and busy[c] < 2 and is_quiet(at, changed, sweep):
             if busy[c] == 1:
                 busy[c] = 0
@@ -132,7 +119,7 @@ def solve_contacts(
         new.normal = wp.max(y[3] - excess / w, 0.0)
         off = wp.abs(new.normal - y[3]) * w
         if off * dt[at.vert[0]] > limits.tolerance * at.edge_length and sweep < limits.sweeps:
-            again[0] = 1
+            worlds.asking[world] = 1
         if rubs:
             new.friction = allowed(yt - (u - un * n) / w, new.normal, to.friction, to.ramp)
         beta = float(0.0)
@@ -146,7 +133,8 @@ def solve_contacts(
         for k in range(5):
             part[5 * c + k] = part_of(k, at, to, change)
             served[at.vert[k]] = sweep
-        busy[c] = wp.where(wp.length(change) * w * dt[at.vert[0]] > limits.negligible, 2, 1)
+        negligible = worlds.negligible[world]
+        busy[c] = wp.where(wp.length(change) * w * dt[at.vert[0]] > negligible, 2, 1)
         new.ahead = wp.vec4(next_friction[0], next_friction[1], next_friction[2], next_normal)
         impulse[c] = new
 
@@ -174,8 +162,7 @@ def apply_impulses(
 def apply_sweep(
     # in
     threads: int,
-    negligible: float,  # [m] a smaller change in a step is negligible for other contacts
-    sweep: wp.array[int],  # (1,)
+    worlds: Worlds,
     dt: wp.array[float],  # (n_vert,) [s]
     graph: ContactGraph,
     part: wp.array[wp.vec3],  # (5 capacity,) [N s]
@@ -187,13 +174,15 @@ def apply_sweep(
     # out
     changed: wp.array[int],  # (n_vert,) this sweep where it changed the velocity, else 0
 ):
-    """For each vertex to which this sweep adds something: add it."""
+    """For each vertex to which this sweep of its world adds something: add it."""
+    sweep = worlds.sweep[0]
     for k in range(wp.tid(), graph.n_touched[0], threads):
         i = graph.touched[k]
-        if served[i] != sweep[0]:
+        world = worlds.of_vert[i]
+        if worlds.doing[world] == DONE or served[i] != sweep:
             continue
         p = total(i, graph, part)
         g = mobility_of(i, bodies)
         v[i] = v[i] + g * p
         received[i] = received[i] + p
-        changed[i] = wp.where(wp.length(p) * g * dt[i] > negligible, sweep[0], 0)
+        changed[i] = wp.where(wp.length(p) * g * dt[i] > worlds.negligible[world], sweep, 0)

@@ -13,6 +13,7 @@ from warp_contact.kernels.impulse.tangent import allowed
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -80,6 +81,8 @@ def recall_edges(
     # in
     threads: int,
     share: float,  # of the kept impulses: 1 for a whole step
+    again: bool,  # the contacts were listed once more: without new ones, a world just goes on
+    worlds: Worlds,
     n_vertex: wp.array[int],  # (1,) contacts of vertices
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -94,7 +97,9 @@ def recall_edges(
         if constraint[c].inv_mass > 0.0:
             level = wp.vec3(0.0, 0.0, 0.0)
             kept = share * found[source[c]].kept
-            impulse[c] = started(turned(kept, contact[c].normal, constraint[c].friction, level))
+            if not again or worlds.has_new[worlds.of_vert[contact[c].vert[0]]] > 0:
+                kept = turned(kept, contact[c].normal, constraint[c].friction, level)
+            impulse[c] = started(kept)
 
 
 @wp.kernel
@@ -121,8 +126,11 @@ def keep_vertices(
 def keep_edges(
     # in
     threads: int,
+    look: int,  # worlds have swept where this look found an overlap: the others keep what they had
+    worlds: Worlds,
     n_vertex: wp.array[int],  # (1,) contacts of vertices
     n_contact: wp.array[int],  # (1,)
+    contact: wp.array[Contact],  # (capacity,)
     source: wp.array[int],  # (capacity,) place of each contact of an edge
     impulse: wp.array[Impulse],  # (capacity,)
     # in, out
@@ -136,6 +144,7 @@ def keep_edges(
         n_edge[0] = wp.max(n_contact[0] - n_vertex[0], 0)
     for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
         now = found[source[c]]
-        now.kept = kept_of(impulse[c])
-        found[source[c]] = now
+        if worlds.open[worlds.of_vert[contact[c].vert[0]]] >= look:
+            now.kept = kept_of(impulse[c])
+            found[source[c]] = now
         edges[c - n_vertex[0]] = now

@@ -10,6 +10,7 @@ from warp_contact.kernels.mobility import Mobility, mobility_of
 from warp_contact.kernels.narrow_phase.contact import Contact, meets_body
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.sorting import sort
+from warp_contact.kernels.worlds import Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -136,11 +137,13 @@ def add_parts(
     graph: ContactGraph,
     part: wp.array[wp.vec3],  # (5 capacity,) [kg y]
     bodies: Mobility,
+    worlds: Worlds,
+    moves: wp.array[int],  # (n_world,) not 0 where there is something to add
     # in, out
     y: wp.array[wp.vec3],  # (n_vert,) positions or velocities
 ):
-    """For each vertex with contacts: add their parts."""
+    """For each vertex with contacts, in worlds that move: add their parts."""
     for k in range(wp.tid(), graph.n_touched[0], threads):
         i = graph.touched[k]
-        if mobility_of(i, bodies) > 0.0:
+        if mobility_of(i, bodies) > 0.0 and moves[worlds.of_vert[i]] > 0:
             y[i] = y[i] + mobility_of(i, bodies) * total(i, graph, part)

@@ -14,6 +14,7 @@ from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact, edge_contact, is_same
 from warp_contact.kernels.narrow_phase.vertex_contact import SLIP
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -72,6 +73,7 @@ def find_crossings(
     # out, added to
     n_place: wp.array[int],  # (1,)
     n_new: wp.array[int],  # (1,) contacts found
+    worlds: Worlds,  # those with such contacts
 ):
     """For each pair: find a contact beside those that it has; 0 contacts for the unused capacity.
 
@@ -108,6 +110,7 @@ def find_crossings(
             continue
         crossing[c] = crossing[c] + 1
         wp.atomic_add(n_new, 0, 1)
+        worlds.has_new[worlds.of_vert[e[0]]] = 1
         k = wp.atomic_add(n_place, 0, 1)
         if k >= contact.shape[0]:
             continue

@@ -107,7 +107,8 @@ def continue_contacts(
         while is_like(k, first, n_before[0], before):
             now = before[k]
             if now.kept[3] > 0.0:
-                now = follow(now, PERSISTENT * mesh.shortest_edge, mesh.edges[e], mesh.tris, x0)
+                near = PERSISTENT * mesh.shortest_edge[body]
+                now = follow(now, near, mesh.edges[e], mesh.tris, x0)
                 if now.found:
                     contact[k] = now
                     crossing[c] = crossing[c] + 1

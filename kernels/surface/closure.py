@@ -25,6 +25,7 @@ from warp_contact.kernels.impulse.constraint import Constraint
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, REST_GAP
 from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import DONE, Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -61,7 +62,6 @@ def begin_closure(
 def solve_gaps(
     # in
     threads: int,
-    sweep: wp.array[int],  # (1,) number of this pass
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
@@ -72,17 +72,20 @@ def solve_gaps(
     # out
     part: wp.array[wp.vec3],  # (5 capacity,) [kg m] what it moves at each vertex
     # out, added to
-    again: wp.array[int],  # (1,) 1 when an overlap is left
+    worlds: Worlds,  # those where an overlap is left
 ):
-    """For each contact: what this pass adds to its push."""
+    """For each contact of a world that is being closed: what this pass adds to its push."""
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
+        world = worlds.of_vert[at.vert[0]]
+        if worlds.doing[world] == DONE:
+            continue
         p = float(0.0)
         w = constraint[c].inv_mass
         if w > 0.0:
             g = gap(at, x) + slack[c]
-            if g < -CLOSURE_TOLERANCE * at.edge_length and sweep[0] < PASSES:
-                again[0] = 1
+            if g < -CLOSURE_TOLERANCE * at.edge_length and worlds.sweep[0] < PASSES:
+                worlds.asking[world] = 1
             p = wp.max(push[c] - g / w, 0.0)
         for k in range(5):
             part[5 * c + k] = at.coef[k] * (p - push[c]) * at.normal

@@ -12,21 +12,24 @@ from warp_contact.kernels.impulse.constraint import Constraint
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, OLD_OVERLAP
 from warp_contact.kernels.narrow_phase.contact import Contact, gap
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import FIRST_LOOK, Worlds
 
 wp.set_module_options(OPTIONS)
 
 STRAY = wp.constant(1.0e-3)  # barycentric weight below which a vertex has left its triangle
 
 # Places in ``found``.
-OPEN = wp.constant(0)  # some overlap is to be closed
-OLD = wp.constant(1)  # some overlap is for the search: it is older than the step
-WAS_OLD = wp.constant(2)  # there was one since the frame began
+WAS_OLD = wp.constant(0)  # some overlap was for the search, since the frame began
+OPEN = wp.constant(1)  # some overlap is to be closed
+OLD = wp.constant(2)  # some overlap is for the search: it is older than the step
+WORLDS = wp.constant(3)  # from here on, for each world: ``open`` of worlds.py
 
 
 @wp.kernel
 def residual_gaps(
     # in
     threads: int,
+    look: int,  # worlds count where the look before this one found an overlap
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
@@ -35,7 +38,8 @@ def residual_gaps(
     # out
     residual: wp.array[float],  # (capacity,) [m], 0 up to the tolerance
     # out, added to
-    found: wp.array[int],  # (3,) 1 where it is true
+    worlds: Worlds,  # those with an overlap to be closed
+    found: wp.array[int],  # (3 + n_world,) 1 where it is true
 ):
     """For each contact: its overlap at x."""
     for c in range(wp.tid(), n_contact[0], threads):
@@ -47,7 +51,10 @@ def residual_gaps(
         edge = at.edge_length
         if d > CLOSURE_TOLERANCE * edge:
             residual[c] = d
-            found[OPEN] = 1
+            world = worlds.of_vert[at.vert[0]]
+            if worlds.open[world] >= look - 1:
+                worlds.open[world] = look
+                found[OPEN] = 1
         old = -constraint[c].gap_bound * dt[at.vert[0]]
         if d > OLD_OVERLAP * edge and old > OLD_OVERLAP * edge:
             found[OLD] = 1
@@ -62,7 +69,8 @@ def find_strays(
     contact: wp.array[Contact],  # (capacity,)
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out, added to
-    found: wp.array[int],  # (3,) 1 for an overlap
+    worlds: Worlds,  # those with an overlap to be closed
+    found: wp.array[int],  # (3 + n_world,) 1 for an overlap
 ):
     """For each contact of a vertex with a triangle: whether the vertex left it, or lies below."""
     for c in range(wp.tid(), n_contact[0], threads):
@@ -79,4 +87,5 @@ def find_strays(
         w = projected_weights(p, at.normal, t0, t1, t2)
         below = wp.dot(p - t0, face) < -CLOSURE_TOLERANCE * at.edge_length
         if wp.min(w) < -STRAY or below:
+            worlds.open[worlds.of_vert[at.vert[0]]] = FIRST_LOOK
             found[OPEN] = 1

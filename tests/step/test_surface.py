@@ -175,10 +175,10 @@ def test_a_vertex_that_left_its_triangle_is_looked_at_again(rng, stages, find_co
         x[model.vert_body.numpy() == 1, 0] += np.float32(way)
         moved = wp.array(x, dtype=wp.vec3)
         residual.find_gaps(model, moved, work)
-        assert work.surface.of_step.numpy().tolist() == [0, 0]  # no overlap is worth a move
+        assert work.surface.of_look.numpy().tolist() == [0, 0]  # no overlap is worth a move
         residual.find_gaps(model, moved, work)
         residual.add_strays(model, moved, work)
-        assert work.surface.of_step.numpy().tolist() == [stray, 0]
+        assert work.surface.of_look.numpy().tolist() == [stray, 0]
 
 
 def test_a_vertex_below_its_triangle_is_looked_at_again(rng, stages, find_contacts, jittered):
@@ -189,7 +189,7 @@ def test_a_vertex_below_its_triangle_is_looked_at_again(rng, stages, find_contac
     record["normal"] = 1.0, 0.0, 0.0
     work.contacts.record.assign(record)
     residual.find_gaps(model, state.x, work)
-    assert work.surface.of_step.numpy().tolist() == [0, 0]
+    assert work.surface.of_look.numpy().tolist() == [0, 0]
     residual.find_gaps(model, state.x, work)
     residual.add_strays(model, state.x, work)
-    assert work.surface.of_step.numpy().tolist() == [1, 0]
+    assert work.surface.of_look.numpy().tolist() == [1, 0]

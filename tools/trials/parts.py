@@ -16,8 +16,8 @@ import warp_contact as wc
 from trials import figures, limits, loads, sweeps
 from trials.setting import NONE, Setting, body, scene, soft
 from trials.watch import attempt
-from warp_contact.kernels.impulse import impulse as impulse_kernels
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
+from warp_contact.kernels.motion import motion
 from warp_contact.step import impulse
 
 
@@ -117,13 +117,13 @@ def crushed() -> float:
 
 
 def sheet() -> float:
-    """Sweeps and steps are counted as they run."""
-    sweeps, steps, flag = (wp.zeros(1, dtype=int) for _ in range(3))
+    """Sweeps and steps are counted as they run, downwards."""
+    sweeps, steps, none = (wp.zeros(1, dtype=int) for _ in range(3))
 
     def counting(function: Callable, number: wp.array) -> Callable:
         def called(*args, **kwargs) -> None:
             function(*args, **kwargs)
-            wp.launch(impulse_kernels.next_sweep, dim=1, inputs=[False], outputs=[flag, number])
+            wp.launch(motion.count_down, dim=1, inputs=[none], outputs=[number])
 
         return called
 

@@ -25,7 +25,9 @@ class NarrowPhase:
         n_place: places taken in ``found``, some of them no longer in use, shape (1,)
         place: place of the first contact of each pair, -1 for none, shape (pairs,)
         source: place of each contact of an edge, shape (contacts,)
+        new: the two below, shape (1 + n_world,)
         n_new: contacts of edges that the last detection pass has added, shape (1,)
+        has_new: 1 for each world that has some of them, shape (n_world,)
         none: zero, shape (1,)
     """
 
@@ -40,14 +42,17 @@ class NarrowPhase:
     n_place: wp.array[int]
     place: wp.array[int]
     source: wp.array[int]
+    new: wp.array[int]
     n_new: wp.array[int]
+    has_new: wp.array[int]
     none: wp.array[int]
 
 
-def allocate(capacity: Capacity) -> NarrowPhase:
+def allocate(capacity: Capacity, n_world: int) -> NarrowPhase:
     """Allocate without any contact."""
     inside_at = wp.zeros(capacity.verts + 1, dtype=int)
     crossing_at = wp.zeros(capacity.edges + 1, dtype=int)
+    new = wp.zeros(1 + n_world, dtype=int)
     return NarrowPhase(
         inside_at=inside_at,
         n_inside=inside_at[capacity.verts :],
@@ -60,6 +65,8 @@ def allocate(capacity: Capacity) -> NarrowPhase:
         n_place=wp.zeros(1, dtype=int),
         place=wp.zeros(capacity.edges, dtype=int),
         source=wp.zeros(capacity.contacts, dtype=int),
-        n_new=wp.zeros(1, dtype=int),
+        new=new,
+        n_new=new[:1],
+        has_new=new[1:],
         none=wp.zeros(1, dtype=int),
     )

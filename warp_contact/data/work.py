@@ -18,9 +18,10 @@ from warp_contact.data import (
 )
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
-from warp_contact.data.structs import lumped, mesh_of
+from warp_contact.data.structs import lumped, mesh_of, n_world, worlds_of
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.mobility import Mobility
+from warp_contact.kernels.worlds import Worlds
 
 
 @dataclass
@@ -35,6 +36,7 @@ class Work:
         awake: what moves
         mesh: what the search for contacts reads of the model
         mobility: how vertices answer impulses
+        worlds: those that do not depend on each other
         scan: scratch of running sums
         f_tet: forces on the corners of each tet [N], shape (4 n_tet,)
         x: predicted positions, then those before the search [m], shape (n_vert,)
@@ -42,7 +44,7 @@ class Work:
         broad_phase: which pairs may touch
         narrow_phase: intermediate results on the way to the contacts
         contacts: the contacts of the step
-        sweeps: counters of the sweeps over them
+        sweeps: state of the sweeps over them
         surface: scratch of the search for the contact surface
         forces: the impulses of the frame
         warm: the impulses of the last step
@@ -55,6 +57,7 @@ class Work:
     awake: Awake
     mesh: Mesh
     mobility: Mobility
+    worlds: Worlds
     scan: list[wp.array[int]]
     f_tet: wp.array[wp.vec3]
     x: wp.array[wp.vec3]
@@ -95,7 +98,8 @@ def allocate_work(
     """
     n, m = model.n_vert, capacity.contacts
     broad = broad_phase.allocate(model, state.x, capacity)
-    narrow = narrow_phase.allocate(capacity)
+    narrow = narrow_phase.allocate(capacity, n_world(model))
+    of_surface = surface.allocate(n_world(model), model.n_body, n, model.n_tet, m)
     return Work(
         capacity=capacity,
         overflow=overflow.allocate(),
@@ -104,6 +108,7 @@ def allocate_work(
         awake=awake or everything(model),
         mesh=mesh_of(model, broad.surface),
         mobility=lumped(model),
+        worlds=worlds_of(model, of_surface.open, narrow.has_new),
         scan=scan.allocate(
             max(2 * n + 2, model.n_edge + 1, capacity.verts + 1, capacity.edges + 1)
         ),
@@ -114,7 +119,7 @@ def allocate_work(
         narrow_phase=narrow,
         contacts=contacts.allocate(n, m, narrow.n_inside),
         sweeps=sweeps.allocate(n, m),
-        surface=surface.allocate(model.n_body, n, model.n_tet, m),
+        surface=of_surface,
         forces=contact_forces.allocate(n, capacity.pairs, unit),
         warm=warm_start.allocate(n, m),
     )

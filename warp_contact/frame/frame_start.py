@@ -15,7 +15,7 @@ class FrameStart:
         """Keep what is now."""
         self._x, self._v = wp.clone(state.x), wp.clone(state.v)
         self._warm = warm_start.copied(work.warm)
-        self._damping = damping.copied(work.damping)
+        self._damping, self._scaled = (damping.copied(work.damping) for _ in range(2))
         self._forces = contact_forces.copied(work.forces)
 
     def keep(self, state: State, work: Work) -> None:
@@ -40,10 +40,14 @@ class FrameStart:
         damping.copy(work.damping, self._damping)
         work.broad_phase.stale.fill_(1)
 
+    def begin_steps(self, work: Work) -> None:
+        """Keep the damping as it is for the length of the steps, for worlds that begin later."""
+        damping.keep(self._scaled, work.damping)
+
     def recall(self, work: Work, verts: np.ndarray, edges: np.ndarray) -> None:
         """Restore what vertices and edges, masks, take over from the last frame."""
         warm_start.recall(work.warm, self._warm, verts, edges, work.overflow.contacts)
-        damping.recall(work.damping, self._damping, verts)
+        damping.recall(work.damping, self._scaled, verts)
 
     def undo(self, state: State, work: Work) -> None:
         """Restore all, as if the frame had not begun."""

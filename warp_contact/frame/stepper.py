@@ -268,15 +268,15 @@ class Stepper:
         work.surface.was_old.zero_()
         work.broad_phase.bodies.rebuild()
         graph = self.buffers.graph(damping_stages, bool(self._overlapping))
-        most = int(self._n.max())
-        for count, begun in segments(self._n, PART if in_parts else most):
+        for count, begun, ends in segments(self._n, PART if in_parts else self._n.max()):
             if self._turns:
                 self._turns.begin(begun, self._dt, work, self._start)
             work.steps.fill_(count)
             wp.capture_launch(graph)
-            after, wrong = rates_now(self._model, self._state, self.spectrum)
-            if wrong or not self._fit(rates, after).all() or enlarged(work) is not None:
-                break
+            if ends or enlarged(work) is not None:
+                after, wrong = rates_now(self._model, self._state, self.spectrum)
+                if wrong or not self._fit(rates, after).all() or enlarged(work) is not None:
+                    break
         return after, wrong
 
     def _begin(self) -> None:

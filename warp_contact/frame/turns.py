@@ -39,6 +39,8 @@ class Turns:
     def begin(self, begun: np.ndarray, dt: np.ndarray, work: Work, start: FrameStart) -> None:
         """Let those worlds that have ``begun`` (n,) move in steps ``dt`` [s] (n,)."""
         before = self._begun
+        if before.all():  # the frame begins, or none will begin later
+            start.begin_steps(work)
         self._let(begun, work)
         work.dt.assign(np.where(begun, dt, 0.0)[self._worlds.of_vert].astype(np.float32))
         anew = begun & ~before
@@ -58,13 +60,14 @@ class Turns:
         work.broad_phase.stale.fill_(1)
 
 
-def segments(n: np.ndarray, part: int) -> Iterator[tuple[int, np.ndarray]]:
+def segments(n: np.ndarray, part: int) -> Iterator[tuple[int, np.ndarray, bool]]:
     """Numbers of steps to take at once, ``part`` at most, and which worlds have begun by then.
 
-    ``n`` are the steps of each world in the frame, shape (n,).
+    ``n`` are the steps of each world in the frame, shape (n,). The third value says whether a part
+    or the frame ends with these steps: what others do must not decide when a world is looked at.
     """
     most = int(n.max())
     starts = {*(most - np.unique(n)).tolist(), *range(0, most, part)}
     bounds = [*sorted(starts), most]
     for first, last in pairwise(bounds):
-        yield last - first, most - n <= first
+        yield last - first, most - n <= first, last == most or last % part == 0

@@ -33,10 +33,10 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
 
 
 def track(model: Model, x: wp.array, work: Work) -> None:
-    """Begin a detection pass at ``x``: add the distances travelled, and set ``n_new`` to 0."""
+    """Begin a detection pass at ``x``: add the distances travelled; no contact is new yet."""
     b = work.broad_phase
     _move(model, x, work)
-    outputs = [b.motion, b.recent, b.travelled, work.narrow_phase.n_new]
+    outputs = [b.motion, b.recent, b.travelled, work.narrow_phase.new]
     wp.launch(skins.add_motion, dim=model.n_body, inputs=[], outputs=outputs)
 
 

@@ -33,12 +33,15 @@ def count_contacts(work: Work, of_edges: wp.array, places: wp.array) -> None:
     )
 
 
-def add_parts(model: Model, y: wp.array, work: Work) -> None:
-    """Add the parts of the contacts to ``y``, positions or velocities, by the mobilities."""
+def add_parts(model: Model, y: wp.array, work: Work, moves: wp.array) -> None:
+    """Add the parts of the contacts to ``y``, positions or velocities, by the mobilities.
+
+    Only in worlds where ``moves``, shape (n_world,), is not 0.
+    """
     c = work.contacts
     launch_over(
         kernels.add_parts,
         model.n_vert,
-        inputs=[c.graph, c.part, work.mobility],
+        inputs=[c.graph, c.part, work.mobility, work.worlds, moves],
         outputs=[y],
     )

@@ -13,12 +13,12 @@ from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import constraint, pair_impulses
 from warp_contact.kernels.impulse import impulse as kernels
 from warp_contact.kernels.lengths import IMPULSE_TOLERANCE
+from warp_contact.kernels.worlds import FIRST_LOOK, NO_LOOK
 from warp_contact.step import residual, sweeps, warm_start
 from warp_contact.step.contact_graph import order_by_vertex
 from warp_contact.step.narrow_phase import append_edge_contacts
 
 SWEEPS = 48  # at most; few clusters of contacts last so long
-NEGLIGIBLE = 0.1  # of the tolerance, at the shortest edge: less does not affect other contacts
 
 
 def solve(model: Model, state: State, work: Work) -> None:
@@ -33,9 +33,9 @@ def add_edges(model: Model, state: State, work: Work) -> None:
 
 
 def solve_again(model: Model, state: State, work: Work) -> None:
-    """Exchange impulses once more where bodies still overlap at the positions ``work.x``."""
+    """Exchange impulses once more in worlds with an overlap at the positions ``work.x``."""
     residual.find_gaps(model, work.x, work)
-    if_any(work.surface.any_open, exchange, model, state.v, work)
+    if_any(work.surface.any_open, exchange, model, state.v, work, FIRST_LOOK)
 
 
 def finish(work: Work) -> None:
@@ -60,13 +60,14 @@ def begin(model: Model, x0: wp.array, work: Work) -> None:
     _begin(model, x0, work, work.narrow_phase.none)
 
 
-def exchange(model: Model, v: wp.array, work: Work) -> None:
+def exchange(model: Model, v: wp.array, work: Work, look: int = NO_LOOK) -> None:
     """Change ``v`` by normal impulses and friction until no contact approaches.
 
-    The contacts of edges are kept, with their impulses, for the next step.
+    Only in worlds where the ``look`` found an overlap, or in all with ``NO_LOOK``. The contacts of
+    edges are kept, with their impulses, for the next step.
     """
-    _sweep_all(model, v, work)
-    warm_start.keep_edges(work)
+    _sweep_all(model, v, work, look)
+    warm_start.keep_edges(work, look)
 
 
 def solve_half_step(model: Model, state: State, work: Work) -> None:
@@ -75,7 +76,7 @@ def solve_half_step(model: Model, state: State, work: Work) -> None:
     warm_start.recall_edges(work, share=0.5)
     warm_start.recall_vertices(work, share=0.5)
     apply(model, state.v, work)
-    _sweep_all(model, state.v, work)
+    _sweep_all(model, state.v, work, NO_LOOK)
 
 
 def apply(model: Model, v: wp.array, work: Work) -> None:
@@ -100,10 +101,8 @@ def add_forces(work: Work) -> None:
     )
 
 
-def _sweep_all(model: Model, v: wp.array, work: Work) -> None:
-    sweeps.repeat(work, _sweep, model, v, work)
-    sweeps.count(work)
-    _sweep(model, v, work, last=True)
+def _sweep_all(model: Model, v: wp.array, work: Work, look: int) -> None:
+    sweeps.repeat(work, look, True, _sweep, model, v, work)
 
 
 def _solve_from_last(model: Model, state: State, work: Work) -> None:
@@ -118,7 +117,7 @@ def _solve_from_last(model: Model, state: State, work: Work) -> None:
 def _add_edges(model: Model, state: State, work: Work) -> None:
     append_edge_contacts(model, state.x, work)
     _begin(model, state.x, work, work.contacts.n_vertex)
-    warm_start.recall_edges(work)
+    warm_start.recall_edges(work, again=True)
 
 
 def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
@@ -133,25 +132,24 @@ def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
     )
 
 
-def _sweep(model: Model, v: wp.array, work: Work, last: bool = False) -> None:
-    c, s, limits = work.contacts, work.sweeps, _limits(work)
+def _sweep(model: Model, v: wp.array, work: Work) -> None:
+    c, s = work.contacts, work.sweeps
     launch_over(
         kernels.solve_contacts,
         work.capacity.contacts,
-        inputs=[limits, last, s.number, work.dt, c.n, c.record, c.constraint, s.changed, v],
-        outputs=[c.impulse, s.busy, c.part, s.served, s.again],
+        inputs=[_limits(), work.dt, c.n, c.record, c.constraint, s.changed, v],
+        outputs=[c.impulse, s.busy, c.part, s.served, work.worlds],
     )
     launch_over(
         kernels.apply_sweep,
         model.n_vert,
-        inputs=[limits.negligible, s.number, work.dt, c.graph, c.part, work.mobility, s.served],
+        inputs=[work.worlds, work.dt, c.graph, c.part, work.mobility, s.served],
         outputs=[v, work.forces.received, s.changed],
     )
 
 
-def _limits(work: Work) -> kernels.Limits:
+def _limits() -> kernels.Limits:
     limits = kernels.Limits()
     limits.extrapolation = 1.0 if on("extrapolation") else 0.0
     limits.tolerance, limits.sweeps = IMPULSE_TOLERANCE, SWEEPS
-    limits.negligible = NEGLIGIBLE * IMPULSE_TOLERANCE * work.mesh.shortest_edge
     return limits

@@ -117,13 +117,14 @@ def _find_edges(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool
             edges.find_crossings,
             work.capacity.edges,
             inputs=[apart, work.mesh, b.edges.list, b.skin, b.recent, b.travelled, x0, x],
-            outputs=[b.edges.clear_until, n.place, n.found, n.crossing_at, n.n_place, n.n_new],
+            outputs=[b.edges.clear_until, n.place, n.found, n.crossing_at]
+            + [n.n_place, n.n_new, work.worlds],
         )
         scan(n.crossing_at, work.scan, inclusive=False)
 
     def find_none() -> None:
         n.n_crossing.zero_()
-        n.n_new.zero_()
+        n.new.zero_()
 
     n = work.narrow_phase
     if on("edges"):

@@ -14,6 +14,7 @@ from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.lengths import OLD_OVERLAP
 from warp_contact.kernels.surface import closure
+from warp_contact.kernels.worlds import FIRST_LOOK, SECOND_LOOK
 from warp_contact.step import residual, search, sweeps
 from warp_contact.step.contact_graph import add_parts
 from warp_contact.step.detection import detect, detect_apart
@@ -33,19 +34,19 @@ def resolve_overlaps(model: Model, state: State, work: Work, iterations: int) ->
     if_any(work.surface.any_open, _resolve_overlaps, model, state, work, iterations)
 
 
-def close(model: Model, state: State, work: Work) -> None:
+def close(model: Model, state: State, work: Work, look: int = FIRST_LOOK) -> None:
     """Move ``state.x`` until no contact overlaps, or as far as one call may move it.
 
-    Vertices then lie in the planes of their triangles, edges on what they touch. Contacts that
-    overlapped when the step began are left out. ``state.v`` changes only by the torque that keeps
-    the angular momentum.
+    Only in worlds where the ``look`` found an overlap. Vertices then lie in the planes of their
+    triangles, edges on what they touch. Contacts that overlapped when the step began are left out.
+    ``state.v`` changes only by the torque that keeps the angular momentum.
     """
-    _close(model, state, work, OLD_OVERLAP)
+    _close(model, state, work, look, OLD_OVERLAP)
 
 
-def close_all(model: Model, state: State, work: Work) -> None:
+def close_all(model: Model, state: State, work: Work, look: int = FIRST_LOOK) -> None:
     """The same with all contacts."""
-    _close(model, state, work, math.inf)
+    _close(model, state, work, look, math.inf)
 
 
 def _close_gaps(model: Model, state: State, work: Work) -> None:
@@ -56,8 +57,8 @@ def _close_gaps(model: Model, state: State, work: Work) -> None:
     # could not see.
     if on("second look"):
         detect_apart(model, state.x, state.x, work)
-    residual.find_gaps(model, state.x, work)
-    if_any(work.surface.any_open, close_all, model, state, work)
+    residual.find_gaps_left(model, state.x, work)
+    if_any(work.surface.any_open, close_all, model, state, work, SECOND_LOOK)
 
 
 def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
@@ -68,8 +69,8 @@ def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -
     rest(model, state, work)
     if on("second look"):
         detect(model, state.x, state.x, work)
-    residual.find_gaps(model, state.x, work)
-    if_any(work.surface.any_open, rest, model, state, work)
+    residual.find_gaps_left(model, state.x, work)
+    if_any(work.surface.any_open, rest, model, state, work, SECOND_LOOK)
 
 
 def _search(model: Model, state: State, work: Work, iterations: int) -> None:
@@ -78,7 +79,7 @@ def _search(model: Model, state: State, work: Work, iterations: int) -> None:
         search.keep_spin(model, state, work)
 
 
-def _close(model: Model, state: State, work: Work, deep: float) -> None:
+def _close(model: Model, state: State, work: Work, look: int, deep: float) -> None:
     """Close all contacts but those that overlapped by more than ``deep`` edges at the start."""
     if not on("closure"):
         return
@@ -89,7 +90,7 @@ def _close(model: Model, state: State, work: Work, deep: float) -> None:
         inputs=[search.SEARCH_BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
         outputs=[s.slack, s.push],
     )
-    sweeps.repeat(work, _sweep, model, state.x, work)
+    sweeps.repeat(work, look, False, _sweep, model, state.x, work)
     if on("closure torque"):
         launch_over(
             closure.torques,
@@ -97,7 +98,7 @@ def _close(model: Model, state: State, work: Work, deep: float) -> None:
             inputs=[c.n, c.record, c.constraint, s.push, state.v],
             outputs=[c.part],
         )
-        add_parts(model, state.v, work)
+        add_parts(model, state.v, work, work.worlds.open)
 
 
 def _sweep(model: Model, x: wp.array, work: Work) -> None:
@@ -105,7 +106,7 @@ def _sweep(model: Model, x: wp.array, work: Work) -> None:
     launch_over(
         closure.solve_gaps,
         work.capacity.contacts,
-        inputs=[work.sweeps.number, c.n, c.record, c.constraint, s.slack, x],
-        outputs=[s.push, c.part, work.sweeps.again],
+        inputs=[c.n, c.record, c.constraint, s.slack, x],
+        outputs=[s.push, c.part, work.worlds],
     )
-    add_parts(model, x, work)
+    add_parts(model, x, work, work.worlds.doing)

@@ -1,4 +1,4 @@
-"""Repeated sweeps over the contacts: a first one, more as long as any contact asks for another."""
+"""Repeated sweeps over the contacts: in each world as long as a contact asks for another."""
 
 from collections.abc import Callable
 
@@ -6,22 +6,31 @@ import warp as wp
 
 from warp_contact.data.launch import while_any
 from warp_contact.data.work import Work
-from warp_contact.kernels.impulse import impulse as kernels
+from warp_contact.kernels import worlds as kernels
 
 
-def repeat(work: Work, sweep: Callable, *arguments) -> None:
-    """Run ``sweep`` with its arguments until it leaves ``sweeps.again`` at 0."""
-    count(work, first=True)
+def repeat(work: Work, look: int, one_more: bool, sweep: Callable, *arguments) -> None:
+    """Run ``sweep`` with its arguments until no contact asks for another.
+
+    Only in worlds where the ``look`` found an overlap; with ``one_more``, once more after that.
+    """
+    s = work.sweeps
+    s.running.zero_()
+    outputs = [work.worlds, s.running]
+    wp.launch(kernels.begin_sweeps, dim=_n(work), inputs=[look], outputs=outputs)
+    while_any(s.running, _sweep, work, one_more, sweep, *arguments)
+
+
+def count(work: Work, one_more: bool) -> None:
+    """Count a sweep, and end those of worlds that need no other."""
+    outputs = [work.worlds, work.sweeps.running]
+    wp.launch(kernels.next_sweep, dim=_n(work), inputs=[one_more], outputs=outputs)
+
+
+def _sweep(work: Work, one_more: bool, sweep: Callable, *arguments) -> None:
     sweep(*arguments)
-    while_any(work.sweeps.again, _again, work, sweep, *arguments)
+    count(work, one_more)
 
 
-def count(work: Work, first: bool = False) -> None:
-    """Count a sweep, from 1 on if it is the first, and ask for no other yet."""
-    outputs = [work.sweeps.again, work.sweeps.number]
-    wp.launch(kernels.next_sweep, dim=1, inputs=[first], outputs=outputs)
-
-
-def _again(work: Work, sweep: Callable, *arguments) -> None:
-    count(work)
-    sweep(*arguments)
+def _n(work: Work) -> int:
+    return work.worlds.doing.shape[0]

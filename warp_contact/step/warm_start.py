@@ -16,13 +16,17 @@ def recall_vertices(work: Work, share: float = 1.0) -> None:
     )
 
 
-def recall_edges(work: Work, share: float = 1.0) -> None:
-    """Start the contacts of edges from a share of the impulses that they have."""
+def recall_edges(work: Work, share: float = 1.0, again: bool = False) -> None:
+    """Start the contacts of edges from a share of the impulses that they have.
+
+    Where they are listed ``again`` in a step, those of worlds without new ones just go on.
+    """
     c, n = work.contacts, work.narrow_phase
     launch_over(
         kernels.recall_edges,
         work.capacity.contacts,
-        inputs=[share, c.n_vertex, c.n, c.record, c.constraint, n.source, n.found],
+        inputs=[share, again, work.worlds, c.n_vertex, c.n, c.record, c.constraint]
+        + [n.source, n.found],
         outputs=[c.impulse],
     )
 
@@ -39,13 +43,13 @@ def keep_vertices(work: Work) -> None:
     )
 
 
-def keep_edges(work: Work) -> None:
-    """Keep the contacts of edges, with their impulses, for the next step."""
+def keep_edges(work: Work, look: int) -> None:
+    """Keep the contacts of edges for the next step; impulses changed where the ``look`` says so."""
     c, n = work.contacts, work.narrow_phase
     launch_over(
         kernels.keep_edges,
         work.capacity.contacts,
-        inputs=[c.n_vertex, c.n, n.source, c.impulse],
+        inputs=[look, work.worlds, c.n_vertex, c.n, c.record, n.source, c.impulse],
         outputs=[n.found, work.warm.edges, work.warm.n_edge],
     )
 

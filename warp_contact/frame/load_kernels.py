@@ -3,7 +3,7 @@
 import warp as wp
 
 from warp_contact.data.model import Model
-from warp_contact.kernels import scan
+from warp_contact.kernels import scan, worlds
 from warp_contact.kernels.broad_phase import bounds, edges, hashing, near, pairs, skins
 from warp_contact.kernels.elastic import shape
 from warp_contact.kernels.impulse import constraint, impulse, pair_impulses, warm_start
@@ -20,7 +20,7 @@ from warp_contact.kernels.surface import closure, residual
 
 # What a frame of any scene uses. The search for overlaps at the start, other responses, sleeping
 # and measuring are left out: many scenes do not need them.
-ALWAYS = (scan, bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure)
+ALWAYS = (scan, worlds, bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure)
 ALWAYS += (constraint, impulse, pair_impulses, warm_start, residual)
 ALWAYS += (contact_graph, crossing, depth, persistent, vertex_contact, vertices)
 

@@ -14,7 +14,7 @@ from warp_contact import NeoHookean, Scene, Simulation, box, sphere
 RUBBER = NeoHookean(5e4, 0.35, 1000.0, 2e-3)
 EDGE = 0.05
 FRAMES = 40
-OBSERVED = ("stack", "hit")
+OBSERVED = ("stack", "undamped stack", "hit")
 
 
 def soft(scene: Scene) -> None:
@@ -57,13 +57,14 @@ def of_worlds(observed: str, neighbours=()) -> Scene:
     """A scene with the observed world and worlds of others."""
     scene = Scene(friction=0.4)
     scene.add_plane((0.0, 0.0, 1.0))
-    if observed == "stack":
-        for k in range(3):
-            scene.add_body(box(0.1, 2), RUBBER, (0.01 * k, 0.003 * k, 0.06 + 0.11 * k))
-    else:
+    if observed == "hit":
         scene.add_body(box(0.1, 2), RUBBER, (0.0, 0.0, 0.0502))
         velocity = (-2.0, 0.0, 0.0)
         scene.add_body(sphere(0.05, 41), RUBBER, (0.2, 0.01, 0.0502), velocity=velocity)
+    else:
+        rubber = RUBBER if observed == "stack" else NeoHookean(5e4, 0.35, 1000.0)
+        for k in range(3):
+            scene.add_body(box(0.1, 2), rubber, (0.01 * k, 0.003 * k, 0.06 + 0.11 * k))
     for add in neighbours:
         add(scene)
     return scene

@@ -137,6 +137,25 @@ def finish(
 
 
 @wp.kernel
+def leave_undamped(
+    # in
+    undamped: wp.array[int],  # (n_vert,) 1 in worlds without a damped body
+    kicked: wp.array[wp.vec3],  # (n_vert,) [m/s] velocities after the forces alone
+    dt: wp.array[float],  # (n_vert,) [s]
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    x_new: wp.array[wp.vec3],  # (n_vert,) [m]
+):
+    """One thread per vertex: in such worlds, move as if no other one were damped."""
+    i = wp.tid()
+    if undamped[i] > 0:
+        u = kicked[i]
+        v[i] = u
+        x_new[i] = x[i] + dt[i] * u
+
+
+@wp.kernel
 def remember(
     # in
     v: wp.array[wp.vec3],  # (n_vert,) [m/s] at the end of a step

@@ -22,6 +22,8 @@ class Damping:
         before: the same in the step before it [m/s], shape (n_vert,)
         free: velocities in this step before the contacts [m/s], shape (n_vert,)
         even, odd: terms of the polynomial [m/s], shape (n_vert,)
+        undamped: 1 in worlds without a damped body, shape (n_vert,); None where there are none
+        kicked: velocities there after the forces [m/s], shape (n_vert,); None likewise
     """
 
     row: wp.array[int]
@@ -32,6 +34,8 @@ class Damping:
     free: wp.array[wp.vec3]
     even: wp.array[wp.vec3]
     odd: wp.array[wp.vec3]
+    undamped: wp.array[int] | None = None
+    kicked: wp.array[wp.vec3] | None = None
 
 
 def allocate(model: Model) -> Damping | None:
@@ -43,11 +47,16 @@ def allocate(model: Model) -> Damping | None:
     return Damping(row, wp.zeros((1, MOST), dtype=float), wp.ones(1, dtype=float), *vectors)
 
 
-def divide(d: Damping | None, of_vert: np.ndarray, n_world: int) -> None:
+def divide(d: Damping | None, model: Model, of_vert: np.ndarray, n_world: int) -> None:
     """Let each world have a polynomial of its own; ``of_vert`` are their numbers, (n_vert,)."""
     if d:
         d.row.assign(of_vert.astype(np.int32))
         d.coef, d.reach = wp.zeros((n_world, MOST), dtype=float), wp.ones(n_world, dtype=float)
+        of_body = np.array([material.damping > 0.0 for material in model.materials])
+        damped = np.bincount(of_vert, of_body[model.vert_body.numpy()], n_world) > 0.0
+        if not damped.all():
+            d.undamped = wp.array(~damped[of_vert], dtype=int)
+            d.kicked = wp.zeros(model.n_vert, dtype=wp.vec3)
 
 
 def copied(d: Damping | None) -> tuple[wp.array, ...]:

@@ -78,5 +78,5 @@ class Buffers:
 
     def _allocate(self, capacity: Capacity) -> Work:
         work = allocate_work(self._model, self._state, capacity, self._awake, self.unit)
-        damping.divide(work.damping, self._worlds.of_vert, self._worlds.n)
+        damping.divide(work.damping, self._model, self._worlds.of_vert, self._worlds.n)
         return work

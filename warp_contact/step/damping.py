@@ -7,6 +7,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.motion import damping as kernels
+from warp_contact.kernels.motion import motion
 from warp_contact.step.forces import apply_damping, internal_forces
 
 
@@ -15,13 +16,12 @@ def kick_damped(model: Model, state: State, work: Work, stages: int) -> None:
     d, inv_mass = work.damping, work.awake.inv_mass
     contacts = [d.last, d.before]
     internal_forces(model, state.x, work.awake.tets, work.f_tet)
-    at_vertex = [model.vt_start, model.vt_corner, work.f_tet, inv_mass]
-    wp.launch(
-        kernels.load,
-        dim=model.n_vert,
-        inputs=[*at_vertex, wp.vec3(*model.gravity), work.dt, *contacts],
-        outputs=[d.even],
-    )
+    forces = [model.vt_start, model.vt_corner, work.f_tet, inv_mass, wp.vec3(*model.gravity)]
+    if d.undamped is not None:
+        inputs = [*forces, work.dt, state.x, state.v]
+        wp.launch(motion.kick, model.n_vert, inputs=inputs, outputs=[work.x, d.kicked])
+    inputs = [*forces, work.dt, *contacts]
+    wp.launch(kernels.load, model.n_vert, inputs=inputs, outputs=[d.even])
     damp(model, state.x, state.v, work, stages)
     wp.launch(
         kernels.finish,
@@ -29,6 +29,9 @@ def kick_damped(model: Model, state: State, work: Work, stages: int) -> None:
         inputs=[work.dt, *contacts, inv_mass, state.x],
         outputs=[state.v, d.free, work.x],
     )
+    if d.undamped is not None:
+        inputs = [d.undamped, d.kicked, work.dt, state.x]
+        wp.launch(kernels.leave_undamped, model.n_vert, inputs=inputs, outputs=[state.v, work.x])
 
 
 def damp_alone(model: Model, state: State, work: Work, stages: int) -> None:

@@ -33,8 +33,8 @@ def looks(monkeypatch):
     def step(sim: Simulation, part: int, second=lambda found: found) -> list:
         rates, found = sim._stepper.spectrum.rates, []
 
-        def look(x):
-            found.append(tuple(rates(x)[:, 0].tolist()))
+        def look(x, of=None):
+            found.append(tuple(rates(x, of)[:, 0].tolist()))
             now = second(found[-1]) if len(found) == 2 else found[-1]
             return np.array(now)[:, None]
 
@@ -89,7 +89,9 @@ def test_so_is_one_whose_end_has_no_finite_stiffness(monkeypatch, times):
         pass
     ends = [np.full((2, 1), np.inf)] * times
     rates = sim._stepper.spectrum.rates
-    monkeypatch.setattr(sim._stepper.spectrum, "rates", lambda x: ends.pop() if ends else rates(x))
+    monkeypatch.setattr(
+        sim._stepper.spectrum, "rates", lambda x, of=None: ends.pop() if ends else rates(x)
+    )
     if times > stepper.HALVED:
         with pytest.raises(SimulationError, match=r"frame 2: stiffness .* flattest is body 'bo"):
             sim.step_frame()

@@ -39,8 +39,8 @@ class Spectrum:
     Deterministic: the first start vector is a fixed random one. Reads back once per restart.
 
     Attributes:
-        flat: whether a tet was so flat, at the last call of ``rates``, that they may rise
-            many times in a few steps
+        flat: worlds with a tet so flat, at the last call of ``rates``, that they may rise many
+            times in a few steps, shape (n_world,)
     """
 
     def __init__(self, model: Model, worlds: Worlds | None = None) -> None:
@@ -64,20 +64,22 @@ class Spectrum:
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
         self._before = wp.zeros(model.n_tet, dtype=wp.mat33)
         self._change = wp.empty((2, model.n_body), dtype=float)
-        self.flat = False
+        self.flat = np.zeros(self._worlds.n, dtype=bool)
         self._at: np.ndarray | None = None
         self._of_bodies = np.zeros((2, model.n_body))
 
-    def rates(self, x: wp.array) -> np.ndarray:
+    def rates(self, x: wp.array, of: np.ndarray | None = None) -> np.ndarray:
         """Rates [1/s] of each world at ``x`` [m], or those kept while its shapes are close to them.
 
         Shape (2, n_world): the largest elastic frequency and damping rate. Rigid motion changes no
         rate. A body whose own rates are far below the largest of its world may change its shape by
-        more than the others until they are found again.
+        more than the others until they are found again. Only the worlds ``of``, a mask, are looked
+        at; None for all.
         """
+        of = np.ones(self._worlds.n, dtype=bool) if of is None else of
         change, flat = self._changes(x)
-        self.flat = bool(flat.any())
-        stale = np.ones(self._worlds.n, dtype=bool) if self._at is None else self._stale(change)
+        self.flat = np.where(of, self._worlds.most(flat) > 0.0, self.flat)
+        stale = of if self._at is None else of & self._stale(change)
         if stale.any():
             own = stale[self._worlds.of_vert, None]
             at = x.numpy().copy()
@@ -131,8 +133,15 @@ class Spectrum:
         starts = {apply: wp.clone(start) for apply, start in self._start.items()}
         return starts, self._at, self._of_bodies, self.flat
 
-    def remind(self, memory: tuple) -> None:
-        """Put back what was kept in the ``memory``, which is used up."""
+    def remind(self, memory: tuple, of: np.ndarray | None = None) -> None:
+        """Put back what was kept in the ``memory``, which is used up; of some worlds, or of all."""
+        if of is not None and not of.all():
+            starts, at, of_bodies, flat = memory
+            own = of[self._worlds.of_vert, None]
+            for apply, start in starts.items():
+                start.assign(np.where(own, start.numpy(), self._start[apply].numpy()))
+            of_bodies = np.where(of[self._worlds.of_body], of_bodies, self._of_bodies)
+            memory = starts, np.where(own, at, self._at), of_bodies, np.where(of, flat, self.flat)
         self._start, self._at, self._of_bodies, self.flat = memory
         if self._at is not None:
             self._remember(wp.array(self._at, dtype=wp.vec3))
@@ -141,7 +150,7 @@ class Spectrum:
         """What the next calls start from."""
         starts = {apply.__name__: start.numpy() for apply, start in self._start.items()}
         if self._at is not None:
-            starts |= {"at": self._at, "of_bodies": self._of_bodies, "flat": np.array(self.flat)}
+            starts |= {"at": self._at, "of_bodies": self._of_bodies, "flat": self.flat}
         return starts
 
     def start_from(self, starts: dict[str, np.ndarray]) -> None:
@@ -156,7 +165,7 @@ class Spectrum:
         if self._at is not None:
             self._remember(wp.array(self._at, dtype=wp.vec3))
         self._of_bodies = starts.get("of_bodies", self._of_bodies)
-        self.flat = bool(starts.get("flat", False))
+        self.flat = starts.get("flat", np.zeros(self._worlds.n, dtype=bool))
 
     def _damping_rates(self, x: wp.array, of: np.ndarray | None = None) -> np.ndarray:
         """Bounds on the eigenvalues [1/s] of M^-1 C of each body, as ``_bounds``."""

@@ -109,8 +109,8 @@ class Stepper:
         return int(self._steps(self._rates(), self.last, frame).max())
 
     def _rates(self) -> np.ndarray:
-        rates = self.last.rates
-        return self.spectrum.rates(self._state.x) if rates is None else rates
+        kept = self.last.rates
+        return self.spectrum.rates(self._state.x) if kept is None else kept
 
     def _steps(self, rates: np.ndarray, last: LastFrame, frame: int) -> np.ndarray:
         of_bodies = self.spectrum.of_bodies[0]
@@ -141,30 +141,29 @@ class Stepper:
                 kept = self.spectrum.memory()
                 after, wrong = self._run(rates, frame, in_parts)
                 fits = self._fit(rates, after)
-            # What explodes would ask for any number of pairs: then nothing grows.
-            self._cut = self._cut or enlarged(self.work) is not None
-            good = not wrong and bool(fits.all())
-            flat = in_parts or bool(wrong) or self._flat()
-            if good and (in_parts or not flat):
+            self._cut = self._cut or enlarged(self.work) is not None  # what explodes never grows
+            flat = in_parts | bool(wrong) | self._flat()
+            again = flat & ~in_parts
+            if not wrong and (fits & ~again).all():
                 return after
             self._start.go_back(self._state, self.work)
             if wrong:
                 if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
                     raise SimulationError(f"frame {frame}: {wrong} ({self._n.max()} substeps)")
                 halved += 1
-                rates = 2.0 * np.stack(
-                    [np.maximum(rates[0], step_bounds.served(self._dt)), rates[1]]
-                )
-            elif not good:
-                least = step_bounds.CUT_SHORT if in_parts else step_bounds.RAISED
+                served = np.maximum(rates[0], step_bounds.served(self._dt))
+                rates = 2.0 * np.stack([served, rates[1]])
+            else:
+                self.spectrum.remind(kept, fits & ~again)  # these take the same steps again
+                least = np.where(in_parts, step_bounds.CUT_SHORT, step_bounds.RAISED)
                 rates = np.where(fits, rates, step_bounds.raised(rates, after, self._dt, least))
             in_parts = flat
         stiffest = self._model.labels[int(self.spectrum.of_bodies[0].argmax())]
         raise SimulationError(f"frame {frame}: no step is stable, not for body '{stiffest}'")
 
-    def _flat(self) -> bool:
-        """Whether a tet was flat at the last check, and the number of steps is free."""
-        return self.wanted is None and self.spectrum.flat
+    def _flat(self) -> np.ndarray:
+        """Worlds in which a tet was flat at the last check; none where steps are not free."""
+        return self.spectrum.flat & (self.wanted is None)
 
     def _fit(self, rates: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Worlds whose steps, chosen for ``rates`` [1/s], fit the rates ``after`` them."""
@@ -241,7 +240,7 @@ class Stepper:
         answer = answer_of(self.buffers.response, self.last.overlapping is False)
         return velocities_now(self._model, self._state, self.work, self.last_dt, answer)
 
-    def _run(self, rates: np.ndarray, frame: int, in_parts: bool) -> tuple[np.ndarray, str]:
+    def _run(self, rates: np.ndarray, frame: int, in_parts: np.ndarray) -> tuple[np.ndarray, str]:
         """Step the frame for the rates given [1/s], shape (2, n_world).
 
         Return what ``rates_now`` finds at the end. With ``in_parts`` the frame ends as soon as its
@@ -268,13 +267,15 @@ class Stepper:
         work.surface.was_old.zero_()
         work.broad_phase.bodies.rebuild()
         graph = self.buffers.graph(damping_stages, bool(self._overlapping))
-        for count, begun, ends in segments(self._n, PART if in_parts else self._n.max()):
+        part = PART if in_parts.any() else self._n.max()
+        for count, begun, ends in segments(self._n, part):
             if self._turns:
                 self._turns.begin(begun, self._dt, work, self._start)
             work.steps.fill_(count)
             wp.capture_launch(graph)
             if ends or enlarged(work) is not None:
-                after, wrong = rates_now(self._model, self._state, self.spectrum)
+                given = self.spectrum, in_parts if ends == "part" else None
+                after, wrong = rates_now(self._model, self._state, *given)
                 if wrong or not self._fit(rates, after).all() or enlarged(work) is not None:
                     break
         return after, wrong

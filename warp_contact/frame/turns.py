@@ -60,7 +60,7 @@ class Turns:
         work.broad_phase.stale.fill_(1)
 
 
-def segments(n: np.ndarray, part: int) -> Iterator[tuple[int, np.ndarray, bool]]:
+def segments(n: np.ndarray, part: int) -> Iterator[tuple[int, np.ndarray, str]]:
     """Numbers of steps to take at once, ``part`` at most, and which worlds have begun by then.
 
     ``n`` are the steps of each world in the frame, shape (n,). The third value says whether a part
@@ -70,4 +70,5 @@ def segments(n: np.ndarray, part: int) -> Iterator[tuple[int, np.ndarray, bool]]
     starts = {*(most - np.unique(n)).tolist(), *range(0, most, part)}
     bounds = [*sorted(starts), most]
     for first, last in pairwise(bounds):
-        yield last - first, most - n <= first, last == most or last % part == 0
+        ends = "frame" if last == most else "part" if last % part == 0 else ""
+        yield last - first, most - n <= first, ends

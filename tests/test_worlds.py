@@ -14,7 +14,7 @@ from warp_contact import NeoHookean, Scene, Simulation, box, sphere
 RUBBER = NeoHookean(5e4, 0.35, 1000.0, 2e-3)
 EDGE = 0.05
 FRAMES = 40
-OBSERVED = ("stack", "undamped stack", "hit")
+OBSERVED = ("stack", "undamped stack", "hit", "edges")
 
 
 def soft(scene: Scene) -> None:
@@ -43,21 +43,23 @@ def pile(scene: Scene) -> None:
         scene.add_body(sphere(0.05, 41), RUBBER, place, world=1)
 
 
-def crossing(scene: Scene) -> None:
+def crossing(scene: Scene, world: int = 1) -> None:
     """Edges fall on edges: new contacts of them are found in many steps."""
     for k in range(3):
         turn = np.pi / 4
         along = (np.sin(turn / 2), 0.0, 0.0) if k % 2 else (0.0, np.sin(turn / 2), 0.0)
         place = (0.003 * k, 0.0, 0.075 + 0.15 * k)
         rotation = (*along, np.cos(turn / 2))
-        scene.add_body(box(0.1, 2), RUBBER, place, rotation, (0.0, 0.0, -1.0), world=1)
+        scene.add_body(box(0.1, 2), RUBBER, place, rotation, (0.0, 0.0, -1.0), world=world)
 
 
 def of_worlds(observed: str, neighbours=()) -> Scene:
     """A scene with the observed world and worlds of others."""
     scene = Scene(friction=0.4)
     scene.add_plane((0.0, 0.0, 1.0))
-    if observed == "hit":
+    if observed == "edges":
+        crossing(scene, world=0)
+    elif observed == "hit":
         scene.add_body(box(0.1, 2), RUBBER, (0.0, 0.0, 0.0502))
         velocity = (-2.0, 0.0, 0.0)
         scene.add_body(sphere(0.05, 41), RUBBER, (0.2, 0.01, 0.0502), velocity=velocity)

@@ -106,7 +106,7 @@ _rows = {
     "deep": ("shorter steps while overlaps last", _deep, parts.THICK_PLATE),
     "thin": ("shorter steps for thin bodies", number(step_bounds, "REACH", INF), parts.THIN),
     "repeats": ("frames repeated in shorter steps", _repeats, parts.PULLED),
-    "within": ("looks within frames with flat tets", number(stepper, "PART", 10**9), parts.CRUSHED),
+    "within": ("looks within frames with flat tets", number(stepper, "PART", 10**9), parts.PRESSED),
     "steady": ("steps that hardly grow again", number(step_bounds, "KEEP", 0.0), parts.VIBRATING),
 }
 PARTS = {key: Part(*row) for key, row in _rows.items()}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from warp_contact import NeoHookean, Penalty, Scene, Simulation, box
+from warp_contact.frame import stepper
 
 G = 9.81
 SOFT = NeoHookean(2e4, 0.3, 1000.0, 2e-3)
@@ -168,3 +169,25 @@ def test_far_from_the_origin_blocks_come_to_rest_where_they_do_at_the_origin():
         held = [sim.measure().forces["body0", "plane0"] for _ in sim.frames(30)]
         assert np.mean(held) == pytest.approx(weight, rel=0.01)
     np.testing.assert_allclose(ends[1], ends[0], atol=0.01 * 0.5)  # 1 % of a size
+
+
+def test_a_reading_that_is_interrupted_changes_nothing(monkeypatch):
+    def falling() -> Simulation:
+        scene = Scene(friction=0.4)
+        scene.add_plane((0.0, 0.0, 1.0))
+        for k in range(2):
+            scene.add_body(box(0.1, 2), SOFT, (0.02 * k, 0.0, 0.05 + 0.11 * k))
+        return run(Simulation(scene), 8)
+
+    read, left = falling(), falling()
+    forces, look = read.measure().forces, stepper.velocities_now
+
+    def interrupted(*given):
+        look(*given)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(stepper, "velocities_now", interrupted)
+        read.velocities()
+    assert read.measure().forces == forces
+    np.testing.assert_array_equal(run(read, 4).positions(), run(left, 4).positions())

@@ -8,7 +8,7 @@ import warp as wp
 
 from warp_contact import checks
 from warp_contact.exclusive import exclusively
-from warp_contact.frame import checkpoint
+from warp_contact.frame import checkpoint, memory
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure.contact_fields import contact_fields
@@ -240,7 +240,7 @@ class Simulation:
         path = checks.path(path, "path")
         with exclusively(self.device):
             values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
-            values |= {"frame": np.array(self.frame)} | self._stepper.values()
+            values |= {"frame": np.array(self.frame)} | memory.values_of(self._stepper)
             values |= {f"meter.{k}": value for k, value in self._meter.tunnelling.memory().items()}
         checkpoint.write(path, self._fingerprint(), values)
 
@@ -255,7 +255,7 @@ class Simulation:
         with exclusively(self.device):
             self.state.x.assign(values["x"])
             self.state.v.assign(values["v"])
-            self._stepper.restore(values)
+            memory.restore(self._stepper, values)
             self._meter = Meter(self.model)
             self._meter.tunnelling.remember(checkpoint.group(values, "meter"))
         self.frame = int(values["frame"])

@@ -6,19 +6,15 @@ import numpy as np
 
 from warp_contact.data import damping, warm_start
 from warp_contact.data.overflow import Capacity
-from warp_contact.data.work import Work
 from warp_contact.frame import checkpoint
-from warp_contact.frame.buffers import Buffers
-from warp_contact.frame.last_frame import LastFrame, last_frame_of
-from warp_contact.frame.sleeping import Sleeping
-from warp_contact.frame.spectrum import Spectrum
+from warp_contact.frame.last_frame import last_frame_of
+from warp_contact.frame.stepper import Stepper
 
 
-def values_of(
-    last: LastFrame, spectrum: Spectrum, work: Work, sleeping: Sleeping | None
-) -> dict[str, np.ndarray]:
-    """All that the next frame depends on; where a frame that explodes ends, on the room too."""
-    groups = {"last": last.values(), "start": spectrum.starts()}
+def values_of(stepper: Stepper) -> dict[str, np.ndarray]:
+    """All that its next frame depends on; where a frame that explodes ends, on the room too."""
+    work, sleeping = stepper.work, stepper.sleeping
+    groups = {"last": stepper.last.values(), "start": stepper.spectrum.starts()}
     groups |= {"warm": warm_start.values(work.warm), "damping": damping.values(work.damping)}
     groups["room"] = {"capacity": np.array(astuple(work.capacity))}
     if sleeping:
@@ -26,14 +22,12 @@ def values_of(
     return checkpoint.ungroup(groups)
 
 
-def restore(
-    values: dict[str, np.ndarray], spectrum: Spectrum, buffers: Buffers, sleeping: Sleeping | None
-) -> LastFrame:
-    """Put the ``values`` back; return the numbers of the last frame."""
-    spectrum.start_from(checkpoint.group(values, "start"))
-    buffers.replace(Capacity(*values["room.capacity"].tolist()))
-    warm_start.restore(buffers.work.warm, checkpoint.group(values, "warm"))
-    damping.restore(buffers.work.damping, checkpoint.group(values, "damping"))
-    if sleeping:
-        sleeping.restore(checkpoint.group(values, "sleeping"), buffers.work)
-    return last_frame_of(checkpoint.group(values, "last"))
+def restore(stepper: Stepper, values: dict[str, np.ndarray]) -> None:
+    """Take over the values of another stepper with the same scene and settings."""
+    stepper.last = last_frame_of(checkpoint.group(values, "last"))
+    stepper.spectrum.start_from(checkpoint.group(values, "start"))
+    stepper.buffers.replace(Capacity(*values["room.capacity"].tolist()))
+    warm_start.restore(stepper.work.warm, checkpoint.group(values, "warm"))
+    damping.restore(stepper.work.damping, checkpoint.group(values, "damping"))
+    if stepper.sleeping:
+        stepper.sleeping.restore(checkpoint.group(values, "sleeping"), stepper.work)

@@ -11,7 +11,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.errors import SimulationError
-from warp_contact.frame import between, memory, step_bounds
+from warp_contact.frame import between, step_bounds
 from warp_contact.frame.buffers import Buffers
 from warp_contact.frame.capacity import enlarged
 from warp_contact.frame.damping import prepare, stages_for
@@ -82,10 +82,9 @@ class Stepper:
     def step(self, frame: int) -> None:
         """Step frame number ``frame``.
 
-        A frame that outgrew its buffers, or whose steps turned out too long for the deformation
-        that came, is repeated from its start. If it begins or ends with a tet that is nearly
-        flat, the rates are checked every ``PART`` steps. Whatever ends it early, an interrupt too,
-        leaves all as the last frame had left it; SimulationError says why no step is possible.
+        A frame that outgrew its buffers, or whose steps proved too long, is repeated from its
+        start. With nearly flat tets the rates are checked every ``PART`` steps. Whatever ends it
+        early leaves all as the last frame did; SimulationError says why no step is possible.
         """
         self._begin()
         try:
@@ -118,8 +117,7 @@ class Stepper:
 
     def _all_sleep(self) -> bool:
         """Decide which bodies sleep; where all do, nothing moves in this frame."""
-        # An overlap that is left has to be searched.
-        if not self.sleeping or self.last.overlapping is not False:
+        if not self.sleeping or self.last.overlapping is not False:  # it has to be searched
             return False
         if self.sleeping.update(self._state, self.work):
             return False
@@ -174,9 +172,13 @@ class Stepper:
         """Velocities [m/s] at the time of the positions, shape (n_vert, 3)."""
         self._start.keep(self._state, self.work)
         found, forces = contacts.copied(self.work.contacts), contact_forces.copied(self.work.forces)
-        now = self._velocities()
-        while self.grow():
+        try:
             now = self._velocities()
+            while self.grow():
+                now = self._velocities()
+        except BaseException:  # an interrupt leaves all as it was
+            self._put_back()
+            raise
         contacts.copy(self.work.contacts, found)
         contact_forces.copy(self.work.forces, forces)
         return now.numpy()
@@ -189,8 +191,8 @@ class Stepper:
 
     def set_positions(self, x: np.ndarray) -> None:
         """Set positions [m], shape (n_vert, 3); overlaps and rates are found before a frame."""
-        given = self._model, self._state, self.work, self.last_dt
-        between.set_positions(*given, x, self.velocities())
+        v = self.velocities()
+        between.set_positions(self._model, self._state, self.work, self.last_dt, x, v)
         self.last = replace(self.last, overlapping=None, rates=None)
         if self.sleeping:
             self.sleeping.wake_all(self.work)
@@ -200,8 +202,8 @@ class Stepper:
         if self._cut:  # where frames end depends on the room that there is
             self.buffers.replace(self._first_capacity)
             self._cut = False
-        for array, first in zip((self._state.x, self._state.v), self.first, strict=True):
-            array.assign(first)
+        self._state.x.assign(self.first[0])
+        self._state.v.assign(self.first[1])
         self.last = none_yet(self.worlds.n)
         self.spectrum.start_from({})
         warm_start.forget(self.work.warm)
@@ -223,14 +225,6 @@ class Stepper:
         contact_forces.copy(self.work.forces, forces)
         return True
 
-    def values(self) -> dict[str, np.ndarray]:
-        """What a checkpoint needs, beside the state."""
-        return memory.values_of(self.last, self.spectrum, self.work, self.sleeping)
-
-    def restore(self, values: dict[str, np.ndarray]) -> None:
-        """Take over the ``values`` of another instance with the same scene and settings."""
-        self.last = memory.restore(values, self.spectrum, self.buffers, self.sleeping)
-
     @property
     def last_dt(self) -> np.ndarray:
         """The last step of each vertex [s], shape (n_vert,)."""
@@ -243,8 +237,8 @@ class Stepper:
     def _run(self, rates: np.ndarray, frame: int, in_parts: np.ndarray) -> tuple[np.ndarray, str]:
         """Step the frame for the rates given [1/s], shape (2, n_world).
 
-        Return what ``rates_now`` finds at the end. With ``in_parts`` the frame ends as soon as its
-        steps no longer fit. It ends early where buffers were too small.
+        Return what ``rates_now`` finds at the end, which comes as soon as the steps of worlds
+        ``in_parts`` no longer fit, or where buffers were too small.
         """
         work, of_vert = self.work, self.worlds.of_vert
         if self._turns:
@@ -294,6 +288,9 @@ class Stepper:
         self.spectrum.remind(self._memory)
         if self.sleeping:
             self.sleeping.undo()
+        self._put_back()
+
+    def _put_back(self) -> None:
         self.buffers.mend(self._start.n_pair)
         if self._turns:
             self._turns.let_all(self.work)

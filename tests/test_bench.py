@@ -13,10 +13,12 @@ import warp_contact.step
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 
-from clock.figures import step_figures
-from clock.scenes import copies, pile
+from clock.figures import figures, step_figures
+from clock.scenes import Case, copies, pile
 from clock.timer import ALONE, MEMORY, OTHER, StageTimer, held
 from clock.window import Cost, Timing, measure
+
+from warp_contact.scenes import load
 
 
 @pytest.fixture
@@ -83,3 +85,10 @@ def test_copies_do_not_share_a_world():
     scene = copies(3)
     assert [body.world for body in scene.bodies] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
     np.testing.assert_allclose(scene.bodies[1].x, scene.bodies[7].x)
+
+
+def test_a_case_is_timed_as_a_whole():
+    case = Case(load("squeezed_sphere").build, 2)
+    found = figures(case, frames=None, repeats=1, device=None)
+    assert found["step.ms"] > 0.0 and 0.0 < found["frame.choice_of_step_share"] < 1.0
+    assert found["substeps"] > 10

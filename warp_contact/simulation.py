@@ -48,6 +48,7 @@ class Simulation:
         device: str | None = None,
         sleeping: bool = False,
         max_substeps: int = 50_000,
+        integrator: str = "explicit",
     ):
         """Lay out a scene.
 
@@ -73,13 +74,14 @@ class Simulation:
         substeps = None if substeps is None else checks.count(substeps, "substeps")
         max_substeps = checks.count(max_substeps, "max_substeps")
         sleeping = checks.flag(sleeping, "sleeping")
+        implicit = checks.one_of(integrator, ("explicit", "implicit"), "integrator") == "implicit"
         self.device = _device(device)
         with exclusively(self.device):
             self.model, self.state = assemble(scene)
             scene.freeze()
             self._bodies = Bodies(self.model, scene)
             load_kernels(self.model, self.device)
-            settings = self.response, self.fps, substeps, max_substeps, sleeping
+            settings = self.response, self.fps, substeps, max_substeps, sleeping, implicit
             self._stepper = Stepper(self.model, self.state, *settings)
             self._meter = Meter(self.model)
 

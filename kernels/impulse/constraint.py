@@ -16,7 +16,7 @@ import warp as wp
 
 from warp_contact.kernels.impulse.tangent import mat53, slope, torque_weight
 from warp_contact.kernels.lengths import REST_GAP
-from warp_contact.kernels.mobility import Mobility, mobility_of
+from warp_contact.kernels.mobility import Mobility, mobility_of, row_of
 from warp_contact.kernels.narrow_phase.contact import Contact, gap, gradient
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, contacts_of
 from warp_contact.kernels.options import OPTIONS
@@ -58,7 +58,11 @@ def inverse_mass(c: Contact, graph: ContactGraph, bodies: Mobility) -> float:
     for k in range(5):
         a = c.coef[k]
         i = c.vert[k]
-        w += a * a * mobility_of(i, bodies) * float(contacts_of(i, graph))
+        row = row_of(i, bodies)
+        if row > 0.0:
+            w += wp.abs(a) * row
+        else:
+            w += a * a * mobility_of(i, bodies) * float(contacts_of(i, graph))
     return w
 
 

@@ -28,7 +28,7 @@ impulse is along n_f. There is no ramp across a gap too wide for friction, nor a
 
 import warp as wp
 
-from warp_contact.kernels.mobility import Mobility, mobility_of
+from warp_contact.kernels.mobility import Mobility, mobility_of, row_of
 from warp_contact.kernels.narrow_phase.contact import Contact, is_of_edge
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, contacts_of
 from warp_contact.kernels.options import OPTIONS
@@ -86,7 +86,9 @@ def torque_weight(
     b = float(0.0)
     for k in range(5):
         i = c.vert[k]
-        m = mobility_of(i, bodies) * float(contacts_of(i, graph))
+        m = row_of(i, bodies)
+        if m == 0.0:
+            m = mobility_of(i, bodies) * float(contacts_of(i, graph))
         g = gap * turn[k]
         q += m * c.coef[k] * g
         b += m * wp.dot(g, g)

@@ -26,10 +26,11 @@ def mesh_of(model: Model, surface: wp.Bvh) -> Mesh:
     return mesh
 
 
-def lumped(model: Model) -> Mobility:
-    """How the vertices answer an impulse: the only source for the contact solver."""
+def mobility_of(model: Model, rows: bool) -> Mobility:
+    """How the vertices answer an impulse; with ``rows`` where some bodies take implicit steps."""
     mobility = Mobility()
     mobility.inv_mass = model.inv_mass
+    mobility.row = wp.zeros(model.n_vert if rows else 0, dtype=float)
     return mobility
 
 

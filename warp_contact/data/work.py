@@ -9,6 +9,7 @@ from warp_contact.data import (
     contact_forces,
     contacts,
     damping,
+    implicit,
     narrow_phase,
     overflow,
     scan,
@@ -18,7 +19,7 @@ from warp_contact.data import (
 )
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
-from warp_contact.data.structs import lumped, mesh_of, n_world, worlds_of
+from warp_contact.data.structs import mesh_of, mobility_of, n_world, worlds_of
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.mobility import Mobility
 from warp_contact.kernels.worlds import Worlds
@@ -40,7 +41,8 @@ class Work:
         scan: scratch of running sums
         f_tet: forces on the corners of each tet [N], shape (4 n_tet,)
         x: predicted positions, then those before the search [m], shape (n_vert,)
-        damping: of damped bodies; None where no body is damped
+        damping: of damped bodies; None where no body is damped, or all take implicit steps
+        implicit: of bodies that take implicit steps; None where none does
         broad_phase: which pairs may touch
         narrow_phase: intermediate results on the way to the contacts
         contacts: the contacts of the step
@@ -62,6 +64,7 @@ class Work:
     f_tet: wp.array[wp.vec3]
     x: wp.array[wp.vec3]
     damping: damping.Damping | None
+    implicit: implicit.ImplicitWork | None
     broad_phase: broad_phase.BroadPhase
     narrow_phase: narrow_phase.NarrowPhase
     contacts: contacts.Contacts
@@ -86,6 +89,7 @@ def allocate_work(
     capacity: overflow.Capacity,
     awake: Awake | None = None,
     unit: float = 1.0,
+    shapes: implicit.Shapes | None = None,
 ) -> Work:
     """Allocate for a step on the current device; the Bvhs are built around ``state.x``.
 
@@ -95,8 +99,10 @@ def allocate_work(
         capacity: of the lists
         awake: what moves; None for everything
         unit: resolution of the recorded impulses [N s]
+        shapes: of the bodies that take implicit steps; None where none does
     """
     n, m = model.n_vert, capacity.contacts
+    awake = awake or everything(model)
     broad = broad_phase.allocate(model, state.x, capacity)
     narrow = narrow_phase.allocate(capacity, n_world(model))
     of_surface = surface.allocate(n_world(model), model.n_body, n, model.n_tet, m)
@@ -105,16 +111,17 @@ def allocate_work(
         overflow=overflow.allocate(),
         dt=wp.zeros(n, dtype=float),
         steps=wp.zeros(1, dtype=int),
-        awake=awake or everything(model),
+        awake=awake,
         mesh=mesh_of(model, broad.surface),
-        mobility=lumped(model),
+        mobility=mobility_of(model, rows=shapes is not None),
         worlds=worlds_of(model, of_surface.open, narrow.has_new),
         scan=scan.allocate(
             max(2 * n + 2, model.n_edge + 1, capacity.verts + 1, capacity.edges + 1)
         ),
         f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=wp.zeros(n, dtype=wp.vec3),
-        damping=damping.allocate(model),
+        damping=None if shapes else damping.allocate(model),
+        implicit=implicit.allocate(model, shapes, awake) if shapes else None,
         broad_phase=broad,
         narrow_phase=narrow,
         contacts=contacts.allocate(n, m, narrow.n_inside),

@@ -4,10 +4,12 @@ import numpy as np
 import warp as wp
 
 from warp_contact.data import damping
+from warp_contact.data.implicit import set_blocks
 from warp_contact.data.model import Model
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work, allocate_work
+from warp_contact.frame.implicit_shapes import Inverses, find_shapes
 from warp_contact.frame.worlds import Worlds
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
@@ -32,9 +34,14 @@ class Buffers:
         response: ContactSurface | Penalty | PredictedForce,
         awake: Awake | None,
         worlds: Worlds,
+        implicit: bool,
     ):
         """Allocate on the current device; ``awake`` is what moves, None for everything."""
         self._worlds = worlds
+        rest = state.x.numpy().astype(np.float64)
+        self._shapes = find_shapes(model, rest) if implicit else None
+        self._inverses = Inverses(model, self._shapes, rest) if implicit else None
+        self._step = 0.0
         self._model, self._state, self._awake = model, state, awake
         self.response = response
         inv_mass = model.inv_mass.numpy()
@@ -43,6 +50,12 @@ class Buffers:
         pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
         self.work: Work = self._allocate(Capacity(pairs=pairs))
         self._graphs: dict[tuple[int, bool], wp.Graph] = {}
+
+    def set_step(self, dt: float) -> None:
+        """Let the mobilities of implicit steps be those of steps ``dt`` [s], if there are any."""
+        if self._inverses and dt not in (0.0, self._step):
+            set_blocks(self.work.implicit, dt, *self._inverses.blocks(dt))
+            self._step = dt
 
     def use(self, work: Work) -> None:
         """Continue with other buffers."""
@@ -77,6 +90,9 @@ class Buffers:
         return self._graphs[key]
 
     def _allocate(self, capacity: Capacity) -> Work:
-        work = allocate_work(self._model, self._state, capacity, self._awake, self.unit)
+        given = self._awake, self.unit, self._shapes
+        work = allocate_work(self._model, self._state, capacity, *given)
+        if self._step > 0.0:
+            set_blocks(work.implicit, self._step, *self._inverses.blocks(self._step))
         damping.divide(work.damping, self._model, self._worlds.of_vert, self._worlds.n)
         return work

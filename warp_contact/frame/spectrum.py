@@ -43,11 +43,15 @@ class Spectrum:
             times in a few steps, shape (n_world,)
     """
 
-    def __init__(self, model: Model, worlds: Worlds | None = None) -> None:
+    def __init__(
+        self, model: Model, worlds: Worlds | None = None, implicit: bool = False
+    ) -> None:
         """Allocate about 160 bytes per vertex and 84 per tet on the current device.
 
         ``worlds`` are those that do not depend on each other; without them all bodies are one.
+        ``implicit`` steps are not limited by any rate: none is looked for.
         """
+        self._implicit = implicit
         self._model, self._worlds = model, worlds or Worlds(model, apart=False)
         chunk, body_chunk = _chunks(model.body_vert.numpy())
         self._chunk = wp.array(chunk, dtype=int)
@@ -76,6 +80,8 @@ class Spectrum:
         more than the others until they are found again. Only the worlds ``of``, a mask, are looked
         at; None for all.
         """
+        if self._implicit:
+            return np.zeros((2, self._worlds.n))
         of = np.ones(self._worlds.n, dtype=bool) if of is None else of
         change, flat = self._changes(x)
         self.flat = np.where(of, self._worlds.most(flat) > 0.0, self.flat)

@@ -29,12 +29,14 @@ class StepCount:
         wanted: int | None,
         most: int,
         worlds: Worlds,
+        implicit: bool = False,
     ):
         """Read sizes of the bodies once."""
         self.fps = fps
         self.wanted = wanted
         self.most = most
         self._model = model
+        self._implicit = implicit
         self._response = response
         self._leaves = not isinstance(response, ContactSurface) or response.search == "literal"
         self._worlds = worlds
@@ -65,6 +67,8 @@ class StepCount:
         if self.wanted:
             return np.full(self._worlds.n, self.wanted)
         omega, speed = self._with_response(omega), self._speed(state)
+        if self._implicit:
+            return np.full(self._worlds.n, 8)
         sizes, overlaps = (self._thickness, self._edge), last.overlapping or self._leaves
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)

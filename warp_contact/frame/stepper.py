@@ -56,6 +56,7 @@ class Stepper:
         wanted: int | None,
         most: int,
         sleeping: bool,
+        implicit: bool = False,
     ):
         """Allocate what the steps need, on the current device."""
         self.fps, self.wanted = fps, wanted
@@ -65,12 +66,13 @@ class Stepper:
         self.last = none_yet(self.worlds.n)
         self.first = state.x.numpy().copy(), state.v.numpy().copy()
         self._model, self._state = model, state
-        self._step_count = StepCount(model, response, fps, wanted, most, self.worlds)
-        self.spectrum = Spectrum(model, self.worlds)
+        self._implicit = implicit
+        self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, implicit)
+        self.spectrum = Spectrum(model, self.worlds, implicit)
         self.sleeping = Sleeping(model, state, fps) if may_sleep else None
         self._turns = Turns(model, self.worlds) if self.worlds.n > 1 else None
         awake = getattr(self.sleeping or self._turns, "awake", None)
-        self.buffers = Buffers(model, state, response, awake, self.worlds)
+        self.buffers = Buffers(model, state, response, awake, self.worlds, implicit)
         self._start = FrameStart(state, self.work)
         self._cut, self._first_capacity = False, self.work.capacity
 
@@ -185,6 +187,7 @@ class Stepper:
 
     def set_velocities(self, values: np.ndarray, at: np.ndarray, body: int) -> None:
         """Set ``values`` [m/s], shape (k, 3), at vertices ``at`` (k,) of a body."""
+        self.buffers.set_step(float(self.last.dt.max()))
         between.set_velocities(self._model, self._state, self.work, self.last_dt, values, at)
         if self.sleeping:
             self.sleeping.wake(body)
@@ -231,6 +234,7 @@ class Stepper:
         return self.last.dt[self.worlds.of_vert]
 
     def _velocities(self) -> wp.array:
+        self.buffers.set_step(float(self.last.dt.max()))
         answer = answer_of(self.buffers.response, self.last.overlapping is False)
         return velocities_now(self._model, self._state, self.work, self.last_dt, answer)
 
@@ -253,6 +257,7 @@ class Stepper:
         if work.damping and stages_for(rates[1], self._dt) > MOST:
             wrong = too_damped(self._model, self.spectrum.of_bodies[1], self._dt)
             raise SimulationError(f"frame {frame}: {wrong}")
+        self.buffers.set_step(float(self._dt.max()))
         damping_stages = prepare(work.damping, rates[1], self._dt, of_vert, self.last.dt)
         lag = 0.5 * (self.last.dt - self._dt)[of_vert]
         shift_velocities(self._model, self._state, work, work.awake, lag)

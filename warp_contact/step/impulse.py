@@ -14,7 +14,7 @@ from warp_contact.kernels.impulse import constraint, pair_impulses
 from warp_contact.kernels.impulse import impulse as kernels
 from warp_contact.kernels.lengths import IMPULSE_TOLERANCE
 from warp_contact.kernels.worlds import FIRST_LOOK, NO_LOOK
-from warp_contact.step import residual, sweeps, warm_start
+from warp_contact.step import implicit_impulse, residual, sweeps, warm_start
 from warp_contact.step.contact_graph import order_by_vertex
 from warp_contact.step.narrow_phase import append_edge_contacts
 
@@ -81,6 +81,8 @@ def solve_half_step(model: Model, state: State, work: Work) -> None:
 
 def apply(model: Model, v: wp.array, work: Work) -> None:
     """Add the parts of the contacts to ``v``, and to the impulses of the frame."""
+    if work.implicit:
+        return implicit_impulse.apply(model, v, work)
     c = work.contacts
     launch_over(
         kernels.apply_impulses,
@@ -124,6 +126,8 @@ def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
     """Contacts from number ``first``, shape (1,), on have no impulse yet; others keep theirs."""
     c = work.contacts
     order_by_vertex(model, work)
+    if work.implicit:
+        implicit_impulse.find_rows(model, work)
     launch_over(
         constraint.begin_contacts,
         work.capacity.contacts,
@@ -140,6 +144,8 @@ def _sweep(model: Model, v: wp.array, work: Work) -> None:
         inputs=[_limits(), work.dt, c.n, c.record, c.constraint, s.changed, v],
         outputs=[c.impulse, s.busy, c.part, s.served, work.worlds],
     )
+    if work.implicit:
+        return implicit_impulse.apply_sweep(model, v, work)
     launch_over(
         kernels.apply_sweep,
         model.n_vert,

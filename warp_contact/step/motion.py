@@ -6,6 +6,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work
 from warp_contact.kernels.motion import motion
+from warp_contact.step import implicit
 from warp_contact.step.damping import kick_damped
 from warp_contact.step.forces import internal_forces
 
@@ -20,6 +21,9 @@ def predict(model: Model, state: State, work: Work, damping_stages: int) -> None
 
 def kick(model: Model, state: State, work: Work, awake: Awake) -> None:
     """Add the acceleration over ``work.dt`` to ``state.v``, and set ``work.x`` = x + h v."""
+    if work.implicit:
+        implicit.kick(model, state, work)
+        return implicit.drift(model, state, work, work.x)
     internal_forces(model, state.x, awake.tets, work.f_tet)
     wp.launch(
         motion.kick,
@@ -31,5 +35,21 @@ def kick(model: Model, state: State, work: Work, awake: Awake) -> None:
 
 
 def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
-    """Set ``out`` = x + h v."""
+    """Set ``out`` to where ``state.v`` leads: x + h v, or along the rotation of a body."""
+    if work.implicit:
+        return implicit.drift(model, state, work, out)
     wp.launch(motion.advance, dim=model.n_vert, inputs=[work.dt, state.x, state.v], outputs=[out])
+
+
+def finish(model: Model, state: State, work: Work) -> None:
+    """Move ``state.x`` by ``state.v``, to the end of the step."""
+    if work.implicit:
+        return implicit.drift(model, state, work, state.x, turned=True)
+    drift(model, state, work, state.x)
+
+
+def finish_free(model: Model, state: State, work: Work) -> None:
+    """The same where nothing touched: ``work.x`` is the end of the step."""
+    if work.implicit:
+        return implicit.drift(model, state, work, state.x, turned=True)
+    wp.copy(state.x, work.x)

@@ -7,14 +7,12 @@ stages in ``kernels/README.md``.
 
 from functools import partial
 
-import warp as wp
-
 from warp_contact.data.launch import if_any
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.step import broad_phase, impulse, narrow_phase, surface
-from warp_contact.step.motion import drift, predict
+from warp_contact.step.motion import drift, finish, finish_free, predict
 
 
 def step(model: Model, state: State, work: Work, damping_stages: int) -> None:
@@ -23,7 +21,7 @@ def step(model: Model, state: State, work: Work, damping_stages: int) -> None:
     No read-back and no allocation, so that a caller may capture it. ``damping_stages`` is
     the number of stages of the damping.
     """
-    fly = partial(in_free_flight, state, work)
+    fly = partial(in_free_flight, model, state, work)
     predict(model, state, work, damping_stages)  # 1
     broad_phase.refresh(model, state.x, work.x, work)  # 2
     if_any(work.broad_phase.any_pair, in_contact, model, state, work, otherwise=fly)
@@ -41,13 +39,13 @@ def in_contact(model: Model, state: State, work: Work) -> None:
     impulse.add_edges(model, state, work)
     impulse.solve_again(model, state, work)  # 5
     impulse.finish(work)
-    drift(model, state, work, state.x)
+    finish(model, state, work)
     surface.close_gaps(model, state, work)  # 8
 
 
-def in_free_flight(state: State, work: Work) -> None:
+def in_free_flight(model: Model, state: State, work: Work) -> None:
     """The rest of the step where no bodies can touch."""
-    wp.copy(state.x, work.x)
+    finish_free(model, state, work)
     impulse.forget(work)
 
 
@@ -55,7 +53,7 @@ def step_overlapping(
     model: Model, state: State, work: Work, damping_stages: int, iterations: int
 ) -> None:
     """The same where bodies may have overlapped before; ``iterations`` are those of the search."""
-    fly = partial(in_free_flight, state, work)
+    fly = partial(in_free_flight, model, state, work)
     predict(model, state, work, damping_stages)
     broad_phase.refresh(model, state.x, work.x, work)
     if_any(work.broad_phase.any_pair, in_overlap, model, state, work, iterations, otherwise=fly)
@@ -71,5 +69,5 @@ def in_overlap(model: Model, state: State, work: Work, iterations: int) -> None:
     impulse.add_edges(model, state, work)
     impulse.solve_again(model, state, work)
     impulse.finish(work)
-    drift(model, state, work, state.x)
+    finish(model, state, work)
     surface.resolve_overlaps(model, state, work, iterations)  # 6, 7, 8

@@ -1,0 +1,154 @@
+"""Stage 1 of bodies that take implicit steps.
+
+    A dv = P^T (h (f - C v) - T h^2 K u) + h m g,   v' = v + P dv + h g               [kg m/s]
+    u = v - G (M v - (A v_c))                   motion that the step does not resolve  [m/s]
+
+f are the internal forces at x, v_c the velocities of fixed vertices. With T = 0 the step is the
+trapezoidal rule for small motions (Newmark 1959, beta = 1/4 to 1/2): it damps nothing, and what is
+faster than the step may gain energy where shapes change. u is what an implicit step would take out
+of v: all of a motion with z = (h omega)^2 >> 1, a part z of one with z << 1. T = 1 damps it by
+1 - z^2 a step for z << 1 and by 2 / z for z >> 1. A body without fixed vertices gets its rigid motion
+from outside forces alone: internal ones have no resultant, and rounding gives them none.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.implicit.mobility import FREE, HELD, Implicit, Rigid, moves, rigid_at
+from warp_contact.kernels.motion.motion import corner_sum
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
+
+DAMPED = wp.constant(1.0)  # T: how much of what is not resolved is damped
+
+
+@wp.kernel
+def sum_forces(
+    # in
+    vt_start: wp.array[int],  # (n_vert + 1,)
+    vt_corner: wp.array[int],  # (4 n_tet,)
+    f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
+    damped: wp.array[wp.vec3],  # (4 n_tet,) corners of C v [N]; empty without damping
+    d: Implicit,
+    # out
+    f: wp.array[wp.vec3],  # (n_vert,) [N]
+):
+    """One thread per vertex: f - C v."""
+    i = wp.tid()
+    f[i] = wp.vec3(0.0, 0.0, 0.0)
+    if d.inv_mass[i] > 0.0 and moves(d.vert_body[i], d):
+        f[i] = corner_sum(i, vt_start, vt_corner, f_tet)
+        if damped.shape[0] > 0:
+            f[i] = f[i] - corner_sum(i, vt_start, vt_corner, damped)
+
+
+@wp.kernel
+def at_fixed(
+    # in
+    d: Implicit,
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    # out
+    v_c: wp.array[wp.vec3],  # (n_vert,) [m/s]
+):
+    """One thread per vertex: the velocities of fixed vertices of bodies that are held."""
+    i = wp.tid()
+    v_c[i] = wp.vec3(0.0, 0.0, 0.0)
+    if d.inv_mass[i] == 0.0 and d.kind[d.vert_body[i]] == HELD:
+        v_c[i] = v[i]
+
+
+@wp.kernel
+def momenta(
+    # in
+    d: Implicit,
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    of_fixed: wp.array[wp.vec3],  # (n_vert,) [kg m/s] A v_c; empty where nothing is held
+    # out
+    p: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
+):
+    """One thread per vertex: M v - A v_c."""
+    i = wp.tid()
+    p[i] = wp.vec3(0.0, 0.0, 0.0)
+    if d.inv_mass[i] > 0.0 and moves(d.vert_body[i], d):
+        p[i] = d.mass[i] * v[i]
+        if of_fixed.shape[0] > 0:
+            p[i] = p[i] - of_fixed[i]
+
+
+@wp.kernel
+def unresolved(
+    # in
+    d: Implicit,
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    resolved: wp.array[wp.vec3],  # (n_vert,) [m/s] G (M v - A v_c)
+    # out
+    u: wp.array[wp.vec3],  # (n_vert,) [m/s]
+):
+    """One thread per vertex: u."""
+    i = wp.tid()
+    u[i] = wp.vec3(0.0, 0.0, 0.0)
+    if d.inv_mass[i] > 0.0 and moves(d.vert_body[i], d):
+        u[i] = v[i] - resolved[i]
+
+
+@wp.kernel
+def load(
+    # in
+    vt_start: wp.array[int],  # (n_vert + 1,)
+    vt_corner: wp.array[int],  # (4 n_tet,)
+    stiff: wp.array[wp.vec3],  # (4 n_tet,) corners of K u [N/s]
+    f: wp.array[wp.vec3],  # (n_vert,) [N]
+    gravity: wp.vec3,  # [m/s^2]
+    d: Implicit,
+    # out
+    r: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
+):
+    """One thread per vertex: the right-hand side, still with the rigid part of rounding."""
+    i = wp.tid()
+    b = d.vert_body[i]
+    r[i] = wp.vec3(0.0, 0.0, 0.0)
+    if d.inv_mass[i] > 0.0 and moves(b, d):
+        h = d.h[0]
+        s = h * f[i] - DAMPED * h * h * corner_sum(i, vt_start, vt_corner, stiff)
+        if d.kind[b] == HELD:
+            s += h * d.mass[i] * gravity
+        r[i] = s
+
+
+@wp.kernel
+def remove_rigid(
+    # in
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    d: Implicit,
+    motion: Rigid,  # by r
+    # in, out
+    r: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
+):
+    """One thread per vertex: P^T r."""
+    i = wp.tid()
+    b = d.vert_body[i]
+    if moves(b, d) and d.kind[b] == FREE:
+        r[i] = r[i] - d.mass[i] * rigid_at(i, b, x[i], d, motion)
+
+
+@wp.kernel
+def kick(
+    # in
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    dv: wp.array[wp.vec3],  # (n_vert,) [m/s] of a whole step
+    gravity: wp.vec3,  # [m/s^2]
+    dt: wp.array[float],  # (n_vert,) [s] h, or a part of it
+    d: Implicit,
+    motion: Rigid,  # of dv
+    # in, out
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+):
+    """One thread per vertex: add what comes about in the time dt."""
+    i = wp.tid()
+    b = d.vert_body[i]
+    if d.inv_mass[i] == 0.0 or not moves(b, d):
+        return
+    u = dv[i]
+    if d.kind[b] == FREE:
+        u += d.h[0] * gravity - rigid_at(i, b, x[i], d, motion)
+    v[i] = v[i] + (dt[i] / d.h[0]) * u

@@ -1,0 +1,155 @@
+"""What the steps of implicit bodies need: their mobilities, and scratch of a step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warp_contact.data.model import Model
+from warp_contact.data.state import Awake
+from warp_contact.kernels.implicit.advance import Drift
+from warp_contact.kernels.implicit.mobility import HELD, Implicit, Rigid
+from warp_contact.kernels.implicit.solve import Iteration
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Which bodies take implicit steps, and which of them share a shape.
+
+    Attributes:
+        kind: of each body, see ``kernels/implicit/mobility.py``, shape (n_body,)
+        of_body: number of the shape of each body, -1 for none, shape (n_body,)
+        placed: rotation of its shape when it was placed, shape (n_body, 3, 3)
+        first: first block of each shape, and the number of all, shape (n_shape + 1,)
+        rest: vertices of the shape of each body from its centre of mass [m], shape (n_vert, 3)
+        inertia: moments of inertia about it [kg m^2], shape (n_body, 3, 3)
+    """
+
+    kind: np.ndarray
+    of_body: np.ndarray
+    placed: np.ndarray
+    first: np.ndarray
+    rest: np.ndarray
+    inertia: np.ndarray
+
+
+@dataclass
+class ImplicitWork:
+    """Allocated only where some body takes implicit steps.
+
+    Attributes:
+        bodies: what kernels know of them
+        x: positions at which the mobilities are [m], shape (n_vert,)
+        any_held: whether some of them have fixed vertices
+        gradient: deformation gradient times volume of each tet [m^3], shape (n_tet,)
+        stiff, damped: corners of K p and C p [N], shape (4 n_tet,); ``damped`` is empty without
+        f: forces [N], shape (n_vert,)
+        r, z, p, ap, dv: of the conjugate gradients, shape (n_vert,)
+        y: R^T P^T p, shape (n_vert,)
+        impulse, answer: impulses on the vertices, and how they answer, shape (n_vert,)
+        share: of the vertices in their contacts, shape (n_vert,)
+        by, of, rest: rigid motions by impulses, of velocities, and at rest
+        busy: 1 where a body has anything to answer, shape (n_body,)
+        drift: how bodies turn in a step
+        iteration: where the iterations are
+        running: bodies that still iterate, shape (1,)
+        none: an empty array
+    """
+
+    bodies: Implicit
+    x: wp.array[wp.vec3]
+    any_held: bool
+    gradient: wp.array[wp.mat33]
+    stiff: wp.array[wp.vec3]
+    damped: wp.array[wp.vec3]
+    f: wp.array[wp.vec3]
+    r: wp.array[wp.vec3]
+    z: wp.array[wp.vec3]
+    p: wp.array[wp.vec3]
+    ap: wp.array[wp.vec3]
+    dv: wp.array[wp.vec3]
+    y: wp.array[wp.vec3]
+    impulse: wp.array[wp.vec3]
+    answer: wp.array[wp.vec3]
+    share: wp.array[float]
+    by: Rigid
+    of: Rigid
+    rest: Rigid
+    busy: wp.array[int]
+    drift: Drift
+    iteration: Iteration
+    running: wp.array[int]
+    none: wp.array[wp.vec3]
+
+
+def allocate(model: Model, shapes: Shapes, awake: Awake) -> ImplicitWork:
+    """Allocate for the bodies that take implicit steps; ``set_blocks`` gives the mobilities."""
+    n, n_tet = model.n_vert, model.n_tet
+    damped = any(e.damped for e in model.elements)
+    names = ("x", "f", "r", "z", "p", "ap", "dv", "y", "impulse", "answer")
+    vectors = {k: wp.zeros(n, dtype=wp.vec3) for k in names}
+    return ImplicitWork(
+        bodies=_bodies(model, shapes, awake),
+        any_held=bool((shapes.kind == int(HELD)).any()),
+        gradient=wp.zeros(n_tet, dtype=wp.mat33),
+        stiff=wp.zeros(4 * n_tet, dtype=wp.vec3),
+        damped=wp.zeros(4 * n_tet if damped else 0, dtype=wp.vec3),
+        share=wp.zeros(n, dtype=float),
+        by=_rigid(model.n_body),
+        of=_rigid(model.n_body),
+        rest=_rigid(model.n_body),
+        busy=wp.zeros(model.n_body, dtype=int),
+        drift=_drift(model.n_body),
+        iteration=_iteration(model.n_body),
+        running=wp.zeros(1, dtype=int),
+        none=wp.zeros(0, dtype=wp.vec3),
+        **vectors,
+    )
+
+
+def set_blocks(work: ImplicitWork, h: float, blocks: np.ndarray, norms: np.ndarray) -> None:
+    """Set the blocks (n, 3, 3) [1/kg] of all shapes, and their norms (n,), for steps ``h`` [s]."""
+    work.bodies.h.fill_(h)
+    work.bodies.block.assign(blocks)
+    work.bodies.norm.assign(norms)
+
+
+def _bodies(model: Model, shapes: Shapes, awake: Awake) -> Implicit:
+    d, n = Implicit(), model.n_body
+    first = np.where(shapes.of_body >= 0, shapes.first[shapes.of_body], 0)
+    d.h = wp.ones(1, dtype=float)
+    d.kind = wp.array(shapes.kind, dtype=int)
+    d.awake, d.body_vert, d.vert_body = awake.bodies, model.body_vert, model.vert_body
+    d.mass, d.inv_mass = model.mass, model.inv_mass
+    d.first = wp.array(first, dtype=int)
+    d.block = wp.zeros(int(shapes.first[-1]), dtype=wp.mat33)
+    d.norm = wp.zeros(int(shapes.first[-1]), dtype=float)
+    d.placed = wp.array(shapes.placed, dtype=wp.mat33)
+    d.rest = wp.array(shapes.rest, dtype=wp.vec3)
+    inverse = [np.linalg.inv(i) if i.any() else i for i in shapes.inertia]
+    d.rest_inertia = wp.array(np.array(inverse), dtype=wp.mat33)
+    d.turn = wp.zeros(model.n_vert, dtype=wp.mat33)
+    d.centre = wp.zeros(n, dtype=wp.vec3)
+    d.inv_total = wp.zeros(n, dtype=float)
+    d.inv_inertia = wp.zeros(n, dtype=wp.mat33)
+    return d
+
+
+def _rigid(n_body: int) -> Rigid:
+    motion = Rigid()
+    motion.v, motion.w = (wp.zeros(n_body, dtype=wp.vec3) for _ in range(2))
+    return motion
+
+
+def _drift(n_body: int) -> Drift:
+    drift = Drift()
+    drift.turn, drift.w = wp.zeros(n_body, dtype=wp.mat33), wp.zeros(n_body, dtype=wp.vec3)
+    return drift
+
+
+def _iteration(n_body: int) -> Iteration:
+    it = Iteration()
+    it.going = wp.zeros(n_body, dtype=int)
+    it.first, it.now = (wp.zeros(n_body, dtype=wp.float64) for _ in range(2))
+    it.along, it.keep = (wp.zeros(n_body, dtype=float) for _ in range(2))
+    return it

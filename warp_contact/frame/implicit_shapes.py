@@ -1,0 +1,182 @@
+"""Shapes of bodies that take implicit steps, and the inverses of A0 that they share.
+
+A0 = M + h C0 + h^2 K0 belongs to a shape at rest, a material, what is fixed and a length of the
+step. Bodies that are equal but for a rigid motion share it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+
+from warp_contact.data.implicit import Shapes
+from warp_contact.data.model import Model
+from warp_contact.kernels.implicit.mobility import FREE, HELD, LUMPED
+from warp_contact.step.forces import apply_damping, apply_stiffness
+
+SAME = 1e-4  # of the size of a body: how far a vertex of an equal one may be
+KEPT = 4  # lengths of steps of which the inverses are kept
+
+
+def find_shapes(model: Model, x: np.ndarray) -> Shapes:
+    """Which bodies take implicit steps and which are equal; ``x`` are rest positions (n_vert, 3)."""
+    kind = np.full(model.n_body, int(LUMPED))
+    of_body = np.full(model.n_body, -1)
+    placed = np.tile(np.eye(3), (model.n_body, 1, 1))
+    like: dict[tuple, list[int]] = {}
+    firsts: list[int] = []
+    start = model.body_vert.numpy()
+    fixed = model.inv_mass.numpy() == 0.0
+    for b in range(model.n_body):
+        own = slice(start[b], start[b + 1])
+        if fixed[own].all():
+            continue
+        kind[b] = int(HELD) if fixed[own].any() else int(FREE)
+        for k in like.setdefault(_key(model, b), []):
+            turn = _rotation(x[start[firsts[k]] : start[firsts[k] + 1]], x[own])
+            if turn is not None:
+                of_body[b], placed[b] = k, turn
+                break
+        else:
+            of_body[b] = len(firsts)
+            like[_key(model, b)].append(len(firsts))
+            firsts.append(b)
+    blocks = [(start[b + 1] - start[b]) ** 2 for b in firsts]
+    first = np.concatenate([[0], np.cumsum(blocks)]).astype(int)
+    rest, inertia = np.zeros((model.n_vert, 3)), np.zeros((model.n_body, 3, 3))
+    mass = model.mass.numpy().astype(float)
+    for b in np.flatnonzero(of_body >= 0):
+        like_it = slice(*start[firsts[of_body[b]] :][:2])
+        own = slice(start[b], start[b + 1])
+        r = x[like_it] - np.average(x[like_it], axis=0, weights=mass[like_it])
+        rest[own] = r
+        inertia[b] = _inertia(mass[own], r)
+    return Shapes(kind, of_body, placed, first, rest, inertia)
+
+
+class Inverses:
+    """The inverses of A0 of all shapes, for a few lengths of the step."""
+
+    def __init__(self, model: Model, shapes: Shapes, x: np.ndarray):
+        """Assemble stiffness and damping at rest; ``x`` are rest positions (n_vert, 3)."""
+        stiff, damped = _element_matrices(model, x)
+        start = model.body_vert.numpy()
+        mass, inv_mass = model.mass.numpy().astype(float), model.inv_mass.numpy()
+        self._shapes = []
+        for k in range(len(shapes.first) - 1):
+            b = int(np.flatnonzero(shapes.of_body == k)[0])
+            free = np.repeat(inv_mass[start[b] : start[b + 1]] > 0.0, 3)
+            m = np.repeat(mass[start[b] : start[b + 1]], 3)
+            r = shapes.rest[start[b] : start[b + 1]]
+            matrices = _assemble(model, b, damped), _assemble(model, b, stiff)
+            self._shapes.append((m, *matrices, free, _rigid_part(m[::3], r) if free.all() else None))
+        self._kept: dict[float, tuple[np.ndarray, np.ndarray]] = {}
+
+    def blocks(self, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Blocks (n, 3, 3) [1/kg] for steps ``h`` [s], shape after shape, and their norms (n,)."""
+        if h not in self._kept:
+            found = [_inverse(h, *shape) for shape in self._shapes]
+            blocks, norms = (np.concatenate(part) for part in zip(*found, strict=True))
+            while len(self._kept) >= KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[h] = blocks.astype(np.float32), norms.astype(np.float32)
+        return self._kept[h]
+
+
+def _key(model: Model, b: int) -> tuple:
+    """What equal bodies have in common, beside their form."""
+    v0, v1 = model.body_vert.numpy()[b : b + 2]
+    t0, t1 = model.body_tet.numpy()[b : b + 2]
+    fixed = model.inv_mass.numpy()[v0:v1] == 0.0
+    tets = model.tets.numpy()[t0:t1] - v0
+    return model.materials[b], fixed.tobytes(), tets.tobytes()
+
+
+def _rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray | None:
+    """The rotation that takes points a into b, shape (n, 3), or None where none does."""
+    p, q = a - a.mean(axis=0), b - b.mean(axis=0)
+    u, _, vt = np.linalg.svd(q.T @ p)
+    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    off = np.abs(q - p @ turn.T).max()
+    return turn if off <= SAME * np.abs(p).max() else None
+
+
+def _element_matrices(model: Model, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and damping of each tet at rest, shape (n_tet, 12, 12).
+
+    Each tet gets vertices of its own, so that twelve products give all columns.
+    """
+    apart = wp.array(x[model.tets.numpy()].reshape(-1, 3), dtype=wp.vec3)
+    of_tets = _with_own_vertices(model)
+    out = np.zeros((2, model.n_tet, 12, 12))
+    f = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
+    for k in range(12):
+        dx = np.zeros((model.n_tet, 4, 3), dtype=np.float32)
+        dx[:, k // 3, k % 3] = 1.0
+        at = wp.array(dx.reshape(-1, 3), dtype=wp.vec3)
+        for matrix, apply in zip(out, (apply_stiffness, apply_damping), strict=True):
+            f.zero_()
+            apply(of_tets, apart, at, f)
+            matrix[:, :, k] = f.numpy().reshape(model.n_tet, 12)
+    return out[0], out[1]
+
+
+def _with_own_vertices(model: Model) -> Model:
+    corners = np.arange(4 * model.n_tet, dtype=np.int32).reshape(-1, 4)
+    return replace(model, tets=wp.array(corners, dtype=wp.vec4i))
+
+
+def _assemble(model: Model, b: int, matrices: np.ndarray) -> np.ndarray:
+    """The matrix of body ``b``, shape (3 n, 3 n), symmetric."""
+    v0, v1 = model.body_vert.numpy()[b : b + 2]
+    t0, t1 = model.body_tet.numpy()[b : b + 2]
+    tets = model.tets.numpy()[t0:t1] - v0
+    rows = (3 * tets[:, :, None] + np.arange(3)).reshape(len(tets), 12)
+    out = np.zeros((3 * (v1 - v0), 3 * (v1 - v0)))
+    np.add.at(out, (rows[:, :, None], rows[:, None, :]), matrices[t0:t1])
+    return 0.5 * (out + out.T)
+
+
+def _inverse(
+    h: float,
+    m: np.ndarray,
+    damping: np.ndarray,
+    stiffness: np.ndarray,
+    free: np.ndarray,
+    rigid: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Blocks of the inverse less its ``rigid`` part, shape (n^2, 3, 3), and norms of the whole.
+
+    Both are 0 for fixed vertices.
+    """
+    a = np.diag(m) + h * damping + h * h * stiffness
+    out = np.zeros_like(a)
+    chosen = np.ix_(free, free)
+    out[chosen] = np.linalg.inv(a[chosen])
+    norms = np.linalg.norm(_blocks(out), ord=2, axis=(1, 2))
+    if rigid is not None:
+        out -= rigid
+        # What rounding leaves of it in a stiff body.
+        project = np.eye(len(m)) - rigid * m
+        out = project @ out @ project.T
+    return _blocks(out), norms
+
+
+def _blocks(a: np.ndarray) -> np.ndarray:
+    n = len(a) // 3
+    return a.reshape(n, 3, n, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)
+
+
+def _inertia(mass: np.ndarray, r: np.ndarray) -> np.ndarray:
+    return (mass * (r * r).sum(axis=1)).sum() * np.eye(3) - (mass[:, None] * r).T @ r
+
+
+def _rigid_part(mass: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """U M_r^-1 U^T of points ``r`` from their centre of mass, shape (3 n, 3 n)."""
+    n = len(r)
+    u = np.zeros((n, 3, 6))
+    u[:, :, :3] = np.eye(3)
+    for k in range(3):
+        u[:, :, 3 + k] = np.cross(np.eye(3)[k], r)
+    u = u.reshape(3 * n, 6)
+    return u @ np.linalg.solve(u.T @ (np.repeat(mass, 3)[:, None] * u), u.T)

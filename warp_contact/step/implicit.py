@@ -1,0 +1,141 @@
+"""The steps of implicit bodies: prediction, answer to impulses, drift.
+
+Where no body takes implicit steps nothing of this runs.
+"""
+
+import warp as wp
+
+from warp_contact.data.implicit import ImplicitWork
+from warp_contact.data.launch import while_any
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.data.work import Work
+from warp_contact.kernels.implicit import advance as drifting
+from warp_contact.kernels.implicit import mobility, predict, solve
+from warp_contact.step.forces import apply_damping, apply_stiffness, internal_forces
+
+
+def kick(model: Model, state: State, work: Work) -> None:
+    """Let forces, weight and damping act on ``state.v`` for ``work.dt``, a step or part of one."""
+    w = work.implicit
+    find_mobility(model, state.x, w)
+    _find_forces(model, state, work)
+    _find_load(model, state, w)
+    _conjugate_gradients(model, state.x, w)
+    _rigid_part(model, w.dv, state.x, w)
+    inputs = [state.x, w.dv, wp.vec3(*model.gravity), work.dt, w.bodies, w.of]
+    wp.launch(predict.kick, model.n_vert, inputs=inputs, outputs=[state.v])
+
+
+def drift(model: Model, state: State, work: Work, out: wp.array, turned: bool = False) -> None:
+    """Set ``out`` to the positions after ``work.dt``; with ``turned``, ``state.v`` to those there."""
+    w = work.implicit
+    _rigid_part(model, state.v, state.x, w)
+    given = [work.dt, state.x]
+    inputs = [*given, state.v, w.bodies, w.of]
+    wp.launch(drifting.find_drift, model.n_body, inputs=inputs, outputs=[w.drift])
+    inputs = [*given, w.bodies, w.of, w.drift, turned]
+    wp.launch(drifting.advance, model.n_vert, inputs=inputs, outputs=[state.v, out])
+
+
+def place(model: Model, x: wp.array, w: ImplicitWork) -> None:
+    """Let the rigid part of the mobilities be that at ``x``."""
+    wp.copy(w.x, x)
+    wp.launch(mobility.find_bodies, model.n_body, inputs=[x], outputs=[w.bodies])
+
+
+def find_mobility(model: Model, x: wp.array, w: ImplicitWork) -> None:
+    """Let the mobilities be those at ``x``."""
+    place(model, x, w)
+    d = w.bodies
+    inputs = [model.tets, model.pose, model.volume, x, d]
+    wp.launch(mobility.find_gradients, model.n_tet, inputs=inputs, outputs=[w.gradient])
+    inputs = [model.vt_start, model.vt_corner, w.gradient]
+    wp.launch(mobility.find_turns, model.n_vert, inputs=inputs, outputs=[d])
+
+
+def answer(model: Model, p: wp.array, out: wp.array, w: ImplicitWork) -> None:
+    """Set ``out`` = G p for impulses ``p``, shape (n_vert,); 0 for other bodies."""
+    d, n, x = w.bodies, model.n_vert, w.x
+    _respond(model, p, x, w)
+    wp.launch(mobility.to_rest, n, inputs=[p, x, d, w.by, w.busy], outputs=[w.y])
+    wp.launch(mobility.at_rest, model.n_body, inputs=[w.y, d, w.busy], outputs=[w.rest])
+    wp.launch(mobility.multiply, n, inputs=[w.y, d, w.rest, w.busy], outputs=[out])
+    _rigid_part(model, out, x, w)
+    wp.launch(mobility.add_rigid, n, inputs=[x, d, w.of, w.by, w.busy], outputs=[out])
+
+
+def _respond(model: Model, p: wp.array, x: wp.array, w: ImplicitWork) -> None:
+    """Set ``by`` and ``busy`` for impulses ``p``."""
+    outputs = [w.by, w.busy]
+    wp.launch(mobility.response_to, model.n_body, inputs=[p, x, w.bodies], outputs=outputs)
+
+
+def _rigid_part(model: Model, y: wp.array, x: wp.array, w: ImplicitWork) -> None:
+    """Set ``of`` for velocities ``y``."""
+    wp.launch(mobility.rigid_part, model.n_body, inputs=[y, x, w.bodies], outputs=[w.of])
+
+
+def _find_forces(model: Model, state: State, work: Work) -> None:
+    """Set ``f`` - C v."""
+    w = work.implicit
+    internal_forces(model, state.x, work.awake.tets, work.f_tet)
+    _apply_damping(model, state.x, state.v, w)
+    inputs = [model.vt_start, model.vt_corner, work.f_tet, w.damped, w.bodies]
+    wp.launch(predict.sum_forces, model.n_vert, inputs=inputs, outputs=[w.f])
+
+
+def _find_load(model: Model, state: State, w: ImplicitWork) -> None:
+    """Set the right-hand side ``r``."""
+    d, n, x, v = w.bodies, model.n_vert, state.x, state.v
+    of_fixed = w.none
+    if w.any_held:
+        wp.launch(predict.at_fixed, n, inputs=[d, v], outputs=[w.p])
+        _multiply(model, x, w.p, w.ap, w)
+        of_fixed = w.ap
+    wp.launch(predict.momenta, n, inputs=[d, v, of_fixed], outputs=[w.r])
+    answer(model, w.r, w.z, w)
+    wp.launch(predict.unresolved, n, inputs=[d, v, w.z], outputs=[w.p])
+    apply_stiffness(model, x, w.p, w.stiff)
+    at_vertex = [model.vt_start, model.vt_corner, w.stiff]
+    inputs = [*at_vertex, w.f, wp.vec3(*model.gravity), d]
+    wp.launch(predict.load, n, inputs=inputs, outputs=[w.r])
+    _respond(model, w.r, x, w)
+    wp.launch(predict.remove_rigid, n, inputs=[x, d, w.by], outputs=[w.r])
+
+
+def _conjugate_gradients(model: Model, x: wp.array, w: ImplicitWork) -> None:
+    """Set ``dv`` from the right-hand side ``r``, which becomes what is left of it."""
+    w.dv.zero_()
+    w.running.zero_()
+    answer(model, w.r, w.z, w)
+    wp.copy(w.p, w.z)
+    inputs = [w.r, w.z, w.bodies]
+    wp.launch(solve.begin, model.n_body, inputs=inputs, outputs=[w.iteration, w.running])
+    while_any(w.running, _iterate, model, x, w)
+
+
+def _iterate(model: Model, x: wp.array, w: ImplicitWork) -> None:
+    d, n, n_body, it = w.bodies, model.n_vert, model.n_body, w.iteration
+    _multiply(model, x, w.p, w.ap, w)
+    wp.launch(solve.find_length, n_body, inputs=[w.p, w.ap, d], outputs=[it])
+    wp.launch(solve.go, n, inputs=[d, it, w.p, w.ap], outputs=[w.dv, w.r])
+    answer(model, w.r, w.z, w)
+    wp.launch(solve.look, n_body, inputs=[w.r, w.z, d], outputs=[it, w.running])
+    wp.launch(solve.find_direction, n, inputs=[d, it, w.z], outputs=[w.p])
+
+
+def _multiply(model: Model, x: wp.array, p: wp.array, out: wp.array, w: ImplicitWork) -> None:
+    """Set ``out`` = A(x) p."""
+    apply_stiffness(model, x, p, w.stiff)
+    _apply_damping(model, x, p, w)
+    inputs = [model.vt_start, model.vt_corner, w.stiff, w.damped, w.bodies, p]
+    wp.launch(solve.multiply, model.n_vert, inputs=inputs, outputs=[out])
+
+
+def _apply_damping(model: Model, x: wp.array, v: wp.array, w: ImplicitWork) -> None:
+    if w.damped.shape[0] == 0:
+        return
+    if not all(e.damped for e in model.elements):
+        w.damped.zero_()
+    apply_damping(model, x, v, w.damped)

@@ -38,6 +38,7 @@ LADDER = (  # of the kernel rooms: each may import those before it
     {"geometry", "lengths", "mesh", "mobility", "scan", "sorting", "worlds"},
     {"elastic"},
     {"motion"},
+    {"implicit"},
     {"broad_phase"},
     {"narrow_phase"},
     {"impulse"},

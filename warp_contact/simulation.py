@@ -9,6 +9,8 @@ import warp as wp
 from warp_contact import checks
 from warp_contact.exclusive import exclusively
 from warp_contact.frame import checkpoint, memory
+from warp_contact.frame.integrator import KINDS as INTEGRATORS
+from warp_contact.frame.integrator import choose
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure.contact_fields import contact_fields
@@ -62,10 +64,13 @@ class Simulation:
             sleeping: under gravity, islands at rest are left alone until something comes near: a
                 settled pile costs next to nothing, at an accuracy that ``frame/sleeping.py`` states
             max_substeps: a frame that needs more of them ends the run, with its reason
+            integrator: ``explicit``, or ``implicit`` for few long steps, whatever the stiffness:
+                these damp vibrations faster than the step, and impacts lose more energy; ``auto``
+                takes the cheaper one, see ``summary``
 
         Raises:
-            ValueError: for an empty scene, an unknown device or response, fps or substeps that are
-                not positive
+            ValueError: for an empty scene, an unknown device, response or integrator, fps or
+                substeps that are not positive, a response that takes no implicit steps
         """
         response = ContactSurface() if response is None else response
         self.scene = checks.instance(scene, Scene, "scene", "a wc.Scene")
@@ -74,21 +79,33 @@ class Simulation:
         substeps = None if substeps is None else checks.count(substeps, "substeps")
         max_substeps = checks.count(max_substeps, "max_substeps")
         sleeping = checks.flag(sleeping, "sleeping")
-        implicit = checks.one_of(integrator, ("explicit", "implicit"), "integrator") == "implicit"
+        checks.one_of(integrator, INTEGRATORS, "integrator")
         self.device = _device(device)
         with exclusively(self.device):
-            self.model, self.state = assemble(scene)
-            scene.freeze()
-            self._bodies = Bodies(self.model, scene)
-            load_kernels(self.model, self.device)
-            settings = self.response, self.fps, substeps, max_substeps, sleeping, implicit
-            self._stepper = Stepper(self.model, self.state, *settings)
-            self._meter = Meter(self.model)
+            self._lay_out(integrator, substeps, max_substeps, sleeping)
+
+    def _lay_out(
+        self, integrator: str, substeps: int | None, max_substeps: int, sleeping: bool
+    ) -> None:
+        self.model, self.state = of = assemble(self.scene)
+        self.scene.freeze()
+        self._bodies = Bodies(self.model, self.scene)
+        load_kernels(self.model, self.device, integrator != "explicit")
+        self._integrator = choose(integrator, *of, self.response, sleeping)
+        settings = self.response, self.fps, substeps, max_substeps, sleeping
+        self._stepper = Stepper(*of, *settings, self._integrator.implicit)
+        self._meter = Meter(self.model)
 
     @property
     def substeps(self) -> int:
         """Steps of the last frame, of the world that took most."""
         return int(self._stepper.last.n.max())
+
+    def summary(self) -> str:
+        """One line: how large the scene is, what steps it takes and why."""
+        m, chosen = self.model, self._integrator
+        size = f"{m.n_body} bodies, {m.n_vert} vertices, {m.n_tet} tets"
+        return f"{size}; {chosen.name} steps: {chosen.why}"
 
     @property
     def time(self) -> float:
@@ -264,7 +281,7 @@ class Simulation:
 
     def _fingerprint(self) -> str:
         sleeping = self._stepper.sleeping is not None
-        settings = self.response, self.fps, self._stepper.wanted, sleeping
+        settings = self.response, self.fps, self._stepper.wanted, sleeping, self._integrator.name
         return checkpoint.fingerprint(self.model, *settings)
 
 

@@ -9,7 +9,15 @@ grow, and a stiff one would turn that into energy.
 
 import warp as wp
 
-from warp_contact.kernels.implicit.mobility import FREE, Implicit, Rigid, mat33f, moves, vec3d, vec3f
+from warp_contact.kernels.implicit.bodies import (
+    FREE,
+    Implicit,
+    Rigid,
+    as_mat33,
+    as_vec3,
+    as_vec3d,
+    moves,
+)
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -67,21 +75,21 @@ def find_drift(
         m = wp.float64(d.mass[i])
         r = x[i] - c
         u = v[i] - motion.v[b] - wp.cross(w, r)
-        q = vec3d(r) + h * vec3d(u)
+        q = as_vec3d(r) + h * as_vec3d(u)
         inertia += m * (wp.dot(q, q) * wp.identity(n=3, dtype=wp.float64) - wp.outer(q, q))
-        spin += m * wp.cross(vec3d(r), vec3d(v[i] - motion.v[b]))
-        rest += m * wp.cross(q, vec3d(u))
+        spin += m * wp.cross(as_vec3d(r), as_vec3d(v[i] - motion.v[b]))
+        rest += m * wp.cross(q, as_vec3d(u))
     scale = wp.trace(inertia)
     inverse = wp.inverse(inertia / scale)
-    before = vec3d(w)
+    before = as_vec3d(w)
     after = before
     turn = rotation(h * before)
     for _ in range(ROUNDS):
         turn = rotation(wp.float64(0.5) * h * (before + after))
         back = wp.transpose(turn)
         after = turn * (inverse * (back * spin - rest)) / scale
-    to.w[b] = vec3f(after)
-    to.turn[b] = mat33f(turn)
+    to.w[b] = as_vec3(after)
+    to.turn[b] = as_mat33(turn)
 
 
 @wp.kernel

@@ -7,13 +7,13 @@ f are the internal forces at x, v_c the velocities of fixed vertices. With T = 0
 trapezoidal rule for small motions (Newmark 1959, beta = 1/4 to 1/2): it damps nothing, and what is
 faster than the step may gain energy where shapes change. u is what an implicit step would take out
 of v: all of a motion with z = (h omega)^2 >> 1, a part z of one with z << 1. T = 1 damps it by
-1 - z^2 a step for z << 1 and by 2 / z for z >> 1. A body without fixed vertices gets its rigid motion
-from outside forces alone: internal ones have no resultant, and rounding gives them none.
+1 - z^2 a step for z << 1 and by 2 / z for z >> 1. A body without fixed vertices gets its rigid
+motion from outside forces alone: internal ones have no resultant, and rounding gives them none.
 """
 
 import warp as wp
 
-from warp_contact.kernels.implicit.mobility import FREE, HELD, Implicit, Rigid, moves, rigid_at
+from warp_contact.kernels.implicit.bodies import FREE, HELD, Implicit, Rigid, moves, rigid_at
 from warp_contact.kernels.motion.motion import corner_sum
 from warp_contact.kernels.options import OPTIONS
 

@@ -3,14 +3,16 @@
     A(x) dv = r,   A = M + h C(x) + h^2 K(x)                                          [kg]
 
 The mobility G of mobility.py is the preconditioner. A is indefinite where tets are pressed hard;
-a body ends where a direction of negative curvature comes up.
+a body ends where a direction of negative curvature comes up. r . G r is about e . A e for an error
+e of dv, at least m e^2: a body ends where that is a negligible motion in a step, as in free flight.
 """
 
 import warp as wp
 
-from warp_contact.kernels.implicit.mobility import Implicit, moves
+from warp_contact.kernels.implicit.bodies import Implicit, moves
 from warp_contact.kernels.motion.motion import corner_sum
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -23,14 +25,12 @@ class Iteration:
     """Where the iterations of each body are."""
 
     going: wp.array[int]  # (n_body,) its number, 0 where it has ended
-    first: wp.array[wp.float64]  # (n_body,) r . G r at the start [J]
+    enough: wp.array[wp.float64]  # (n_body,) r . G r at which it ends [J]
     now: wp.array[wp.float64]  # (n_body,) the same now [J]
-    along: wp.array[float]  # (n_body,) how far to go along the direction
-    keep: wp.array[float]  # (n_body,) part of the old direction in the next
 
 
 @wp.func
-def product(a: wp.array[wp.vec3], b: wp.array[wp.vec3], first: int, last: int) -> wp.float64:
+def inner(a: wp.array[wp.vec3], b: wp.array[wp.vec3], first: int, last: int) -> wp.float64:
     s = wp.float64(0.0)
     for i in range(first, last):
         s += wp.float64(wp.dot(a[i], b[i]))
@@ -66,6 +66,7 @@ def begin(
     r: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
     z: wp.array[wp.vec3],  # (n_vert,) [m/s] G r
     d: Implicit,
+    worlds: Worlds,
     # out
     to: Iteration,
     # out, added to
@@ -74,55 +75,50 @@ def begin(
     """One thread per body: begin to iterate where there is anything to do."""
     b = wp.tid()
     to.going[b] = 0
-    if moves(b, d):
-        rz = product(r, z, d.body_vert[b], d.body_vert[b + 1])
-        to.first[b] = rz
-        to.now[b] = rz
-        if rz > wp.float64(0.0):
-            to.going[b] = 1
-            wp.atomic_add(running, 0, 1)
+    if not moves(b, d):
+        return
+    first = d.body_vert[b]
+    last = d.body_vert[b + 1]
+    mass = wp.float64(0.0)
+    for i in range(first, last):
+        mass += wp.float64(d.mass[i])
+    speed = wp.float64(worlds.negligible[worlds.of_vert[first]] / d.h[0])
+    rz = inner(r, z, first, last)
+    to.now[b] = rz
+    to.enough[b] = wp.max(wp.float64(TOLERANCE * TOLERANCE) * rz, mass * speed * speed)
+    if rz > to.enough[b]:
+        to.going[b] = 1
+        wp.atomic_add(running, 0, 1)
 
 
 @wp.kernel
-def find_length(
+def go(
     # in
     p: wp.array[wp.vec3],  # (n_vert,) [m/s]
     ap: wp.array[wp.vec3],  # (n_vert,) [kg m/s] A p
     d: Implicit,
     # in, out
     to: Iteration,
-):
-    """One thread per body: how far to go along p."""
-    b = wp.tid()
-    to.along[b] = 0.0
-    if to.going[b] == 0:
-        return
-    curvature = product(p, ap, d.body_vert[b], d.body_vert[b + 1])
-    if curvature > wp.float64(0.0):
-        to.along[b] = wp.float32(to.now[b] / curvature)
-    else:
-        if to.going[b] == 1:
-            to.along[b] = 1.0
-        to.going[b] = -1
-
-
-@wp.kernel
-def go(
-    # in
-    d: Implicit,
-    to: Iteration,
-    p: wp.array[wp.vec3],  # (n_vert,) [m/s]
-    ap: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
-    # in, out
     dv: wp.array[wp.vec3],  # (n_vert,) [m/s]
     r: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
 ):
-    """One thread per vertex: go along p."""
-    i = wp.tid()
-    b = d.vert_body[i]
-    if to.along[b] != 0.0:
-        dv[i] = dv[i] + to.along[b] * p[i]
-        r[i] = r[i] - to.along[b] * ap[i]
+    """One thread per body: go along p to the least energy."""
+    b = wp.tid()
+    if to.going[b] == 0:
+        return
+    first = d.body_vert[b]
+    last = d.body_vert[b + 1]
+    curvature = inner(p, ap, first, last)
+    along = float(0.0)
+    if curvature > wp.float64(0.0):
+        along = wp.float32(to.now[b] / curvature)
+    else:
+        if to.going[b] == 1:
+            along = 1.0
+        to.going[b] = -1
+    for i in range(first, last):
+        dv[i] = dv[i] + along * p[i]
+        r[i] = r[i] - along * ap[i]
 
 
 @wp.kernel
@@ -133,35 +129,23 @@ def look(
     d: Implicit,
     # in, out
     to: Iteration,
+    p: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out, added to
     running: wp.array[int],  # (1,) bodies that go on
 ):
-    """One thread per body: whether it has converged."""
+    """One thread per body: whether it has converged; else the next direction."""
     b = wp.tid()
     if to.going[b] == 0:
         return
-    rz = product(r, z, d.body_vert[b], d.body_vert[b + 1])
-    enough = rz <= wp.float64(TOLERANCE * TOLERANCE) * to.first[b]
-    if to.going[b] < 0 or enough or to.going[b] == ITERATIONS:
+    first = d.body_vert[b]
+    last = d.body_vert[b + 1]
+    rz = inner(r, z, first, last)
+    if to.going[b] < 0 or rz <= to.enough[b] or to.going[b] == ITERATIONS:
         to.going[b] = 0
         wp.atomic_sub(running, 0, 1)
         return
-    to.keep[b] = wp.float32(rz / to.now[b])
+    keep = wp.float32(rz / to.now[b])
     to.now[b] = rz
     to.going[b] = to.going[b] + 1
-
-
-@wp.kernel
-def find_direction(
-    # in
-    d: Implicit,
-    to: Iteration,
-    z: wp.array[wp.vec3],  # (n_vert,) [m/s]
-    # in, out
-    p: wp.array[wp.vec3],  # (n_vert,) [m/s]
-):
-    """One thread per vertex: the next direction."""
-    i = wp.tid()
-    b = d.vert_body[i]
-    if to.going[b] > 0:
-        p[i] = z[i] + to.keep[b] * p[i]
+    for i in range(first, last):
+        p[i] = z[i] + keep * p[i]

@@ -62,6 +62,69 @@ def part_of(k: int, c: Contact, to: Constraint, p: wp.vec3) -> wp.vec3:
     return c.coef[k] * p + to.gap * wp.dot(to.turn[k], p) * c.normal
 
 
+@wp.func
+def rubs(to: Constraint) -> bool:
+    """Whether a contact has tangential impulses."""
+    return to.friction > 0.0 or wp.length_sq(to.ramp) > 0.0
+
+
+@wp.func
+def surface_velocity(c: Contact, to: Constraint, v: wp.array[wp.vec3]) -> wp.vec3:
+    """u, relative to the turning of the other surface where that matters [m/s]."""
+    u = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(5):
+        vk = v[c.vert[k]]
+        u += c.coef[k] * vk
+        if rubs(to):
+            u += to.gap * wp.dot(c.normal, vk) * to.turn[k]
+    return u
+
+
+@wp.func
+def projected(
+    before: Impulse, u: wp.vec3, un: float, excess: float, n: wp.vec3, to: Constraint, w: float
+) -> Impulse:
+    """The impulses of a sweep, those that are allowed next to a step of 1 / w from ``ahead``."""
+    y = before.ahead
+    new = Impulse()
+    new.normal = wp.max(y[3] - excess / w, 0.0)
+    if rubs(to):
+        along = wp.vec3(y[0], y[1], y[2]) - (u - un * n) / w
+        new.friction = allowed(along, new.normal, to.friction, to.ramp)
+    return new
+
+
+@wp.func
+def ahead_of(new: Impulse, before: Impulse, beta: float) -> wp.vec4:
+    """The impulses extrapolated by beta; not at all where the last change went too far."""
+    b = beta
+    if (before.ahead[3] - new.normal) * (new.normal - before.normal) > 0.0:
+        b = 0.0
+    normal = new.normal + b * (new.normal - before.normal)
+    friction = new.friction + b * (new.friction - before.friction)
+    return wp.vec4(friction[0], friction[1], friction[2], normal)
+
+
+@wp.func
+def add_to_parts(
+    c: int,
+    at: Contact,
+    to: Constraint,
+    before: wp.vec4,
+    after: wp.vec4,
+    sweep: int,
+    part: wp.array[wp.vec3],
+    served: wp.array[int],
+) -> wp.vec3:
+    """Set the parts of contact c by which its impulses change; the sum of both [N s]."""
+    p = (after[3] - before[3]) * at.normal + wp.vec3(after[0], after[1], after[2])
+    p -= wp.vec3(before[0], before[1], before[2])
+    for k in range(5):
+        part[5 * c + k] = part_of(k, at, to, p)
+        served[at.vert[k]] = sweep
+    return p
+
+
 @wp.kernel
 def solve_contacts(
     # in
@@ -103,39 +166,21 @@ def solve_contacts(
             clear_parts(c, part)
             continue
         n = at.normal
-        rubs = to.friction > 0.0 or wp.length_sq(to.ramp) > 0.0
-        u = wp.vec3(0.0, 0.0, 0.0)
-        for k in range(5):
-            vk = v[at.vert[k]]
-            u += at.coef[k] * vk
-            if rubs:
-                u += to.gap * wp.dot(n, vk) * to.turn[k]
+        u = surface_velocity(at, to, v)
         un = wp.dot(u, n)
         excess = un + wp.max(to.gap_bound, 0.0)
         before = impulse[c]
-        y = before.ahead
-        yt = wp.vec3(y[0], y[1], y[2])
-        new = Impulse()
-        new.normal = wp.max(y[3] - excess / w, 0.0)
-        off = wp.abs(new.normal - y[3]) * w
+        new = projected(before, u, un, excess, n, to, w)
+        off = wp.abs(new.normal - before.ahead[3]) * w
         if off * dt[at.vert[0]] > limits.tolerance * at.edge_length and sweep < limits.sweeps:
             worlds.asking[world] = 1
-        if rubs:
-            new.friction = allowed(yt - (u - un * n) / w, new.normal, to.friction, to.ramp)
         beta = float(0.0)
         if not last:
             beta = limits.extrapolation * float(sweep - 1) / float(sweep + 2)
-        if (y[3] - new.normal) * (new.normal - before.normal) > 0.0:
-            beta = 0.0
-        next_normal = new.normal + beta * (new.normal - before.normal)
-        next_friction = new.friction + beta * (new.friction - before.friction)
-        change = (next_normal - y[3]) * n + next_friction - yt
-        for k in range(5):
-            part[5 * c + k] = part_of(k, at, to, change)
-            served[at.vert[k]] = sweep
+        new.ahead = ahead_of(new, before, beta)
+        change = add_to_parts(c, at, to, before.ahead, new.ahead, sweep, part, served)
         negligible = worlds.negligible[world]
         busy[c] = wp.where(wp.length(change) * w * dt[at.vert[0]] > negligible, 2, 1)
-        new.ahead = wp.vec4(next_friction[0], next_friction[1], next_friction[2], next_normal)
         impulse[c] = new
 
 

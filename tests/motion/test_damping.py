@@ -49,6 +49,7 @@ def ready(model, x, v, dt: float, rate: float) -> tuple[State, SimpleNamespace, 
         f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=wp.zeros(model.n_vert, dtype=wp.vec3),
         damping=allocate(model),
+        implicit=None,
     )
     of_vert, world = np.zeros(model.n_vert, dtype=int), np.ones(1)
     given = rate * world, dt * world, of_vert, 0.0 * world

@@ -119,6 +119,12 @@ def add_run(group) -> None:
         dest="settings",
         help="arguments of the scene's build(): a Python literal or else a string",
     )
+    add(
+        "--integrator",
+        choices=run.INTEGRATORS,
+        default="explicit",
+        help="steps; default: %(default)s",
+    )
     add("--sleep", action="store_true", help="leave bodies at rest alone until something comes")
     old = command.add_mutually_exclusive_group().add_argument
     old("--resume", action="store_true", help="go on from DIR/checkpoint.npz, up to frame N")

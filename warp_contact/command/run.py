@@ -50,6 +50,7 @@ def run(args) -> int:
             sim = simulation(module, scene, args)
         except ValueError as error:
             raise UsageError(str(error)) from error
+        announce(sim.summary(), args.quiet)
         return write_run(sim, module, folder, n, args)
 
 
@@ -87,6 +88,7 @@ def simulation(module, scene: Scene, args) -> Simulation:
         max_substeps=args.max_substeps,
         device=args.device,
         sleeping=args.sleep,
+        integrator=args.integrator,
     )
 
 

@@ -8,8 +8,9 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake
 from warp_contact.kernels.implicit.advance import Drift
-from warp_contact.kernels.implicit.mobility import HELD, Implicit, Rigid
+from warp_contact.kernels.implicit.bodies import HELD, Implicit, Rigid
 from warp_contact.kernels.implicit.solve import Iteration
+from warp_contact.kernels.impulse.rows import Touched
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class Shapes:
     """Which bodies take implicit steps, and which of them share a shape.
 
     Attributes:
-        kind: of each body, see ``kernels/implicit/mobility.py``, shape (n_body,)
+        kind: of each body, see ``kernels/implicit/bodies.py``, shape (n_body,)
         of_body: number of the shape of each body, -1 for none, shape (n_body,)
         placed: rotation of its shape when it was placed, shape (n_body, 3, 3)
         first: first block of each shape, and the number of all, shape (n_shape + 1,)
@@ -47,13 +48,17 @@ class ImplicitWork:
         r, z, p, ap, dv: of the conjugate gradients, shape (n_vert,)
         y: R^T P^T p, shape (n_vert,)
         impulse, answer: impulses on the vertices, and how they answer, shape (n_vert,)
+        before: velocities or positions before the sweeps, shape (n_vert,)
         share: of the vertices in their contacts, shape (n_vert,)
+        touched: vertices of each body with contacts
+        counted: contacts in the row sums, shape (contacts,)
+        ahead: extrapolated pushes of the closure [kg m], shape (contacts,)
         by, of, rest: rigid motions by impulses, of velocities, and at rest
         busy: 1 where a body has anything to answer, shape (n_body,)
         drift: how bodies turn in a step
         iteration: where the iterations are
         running: bodies that still iterate, shape (1,)
-        none: an empty array
+        none, every: empty arrays
     """
 
     bodies: Implicit
@@ -71,7 +76,11 @@ class ImplicitWork:
     y: wp.array[wp.vec3]
     impulse: wp.array[wp.vec3]
     answer: wp.array[wp.vec3]
+    before: wp.array[wp.vec3]
     share: wp.array[float]
+    touched: Touched
+    counted: wp.array[int]
+    ahead: wp.array[float]
     by: Rigid
     of: Rigid
     rest: Rigid
@@ -80,13 +89,14 @@ class ImplicitWork:
     iteration: Iteration
     running: wp.array[int]
     none: wp.array[wp.vec3]
+    every: wp.array[int]
 
 
-def allocate(model: Model, shapes: Shapes, awake: Awake) -> ImplicitWork:
+def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> ImplicitWork:
     """Allocate for the bodies that take implicit steps; ``set_blocks`` gives the mobilities."""
     n, n_tet = model.n_vert, model.n_tet
     damped = any(e.damped for e in model.elements)
-    names = ("x", "f", "r", "z", "p", "ap", "dv", "y", "impulse", "answer")
+    names = ("x", "f", "r", "z", "p", "ap", "dv", "y", "impulse", "answer", "before")
     vectors = {k: wp.zeros(n, dtype=wp.vec3) for k in names}
     return ImplicitWork(
         bodies=_bodies(model, shapes, awake),
@@ -95,6 +105,9 @@ def allocate(model: Model, shapes: Shapes, awake: Awake) -> ImplicitWork:
         stiff=wp.zeros(4 * n_tet, dtype=wp.vec3),
         damped=wp.zeros(4 * n_tet if damped else 0, dtype=wp.vec3),
         share=wp.zeros(n, dtype=float),
+        touched=_touched(model),
+        counted=wp.zeros(n_contact, dtype=int),
+        ahead=wp.zeros(n_contact, dtype=float),
         by=_rigid(model.n_body),
         of=_rigid(model.n_body),
         rest=_rigid(model.n_body),
@@ -103,6 +116,7 @@ def allocate(model: Model, shapes: Shapes, awake: Awake) -> ImplicitWork:
         iteration=_iteration(model.n_body),
         running=wp.zeros(1, dtype=int),
         none=wp.zeros(0, dtype=wp.vec3),
+        every=wp.zeros(0, dtype=int),
         **vectors,
     )
 
@@ -150,6 +164,12 @@ def _drift(n_body: int) -> Drift:
 def _iteration(n_body: int) -> Iteration:
     it = Iteration()
     it.going = wp.zeros(n_body, dtype=int)
-    it.first, it.now = (wp.zeros(n_body, dtype=wp.float64) for _ in range(2))
-    it.along, it.keep = (wp.zeros(n_body, dtype=float) for _ in range(2))
+    it.enough, it.now = (wp.zeros(n_body, dtype=wp.float64) for _ in range(2))
     return it
+
+
+def _touched(model: Model) -> Touched:
+    touched = Touched()
+    touched.n = wp.zeros(model.n_body, dtype=int)
+    touched.vert = wp.zeros(model.n_vert, dtype=int)
+    return touched

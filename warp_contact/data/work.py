@@ -93,13 +93,8 @@ def allocate_work(
 ) -> Work:
     """Allocate for a step on the current device; the Bvhs are built around ``state.x``.
 
-    Args:
-        model: what does not change
-        state: for the Bvhs
-        capacity: of the lists
-        awake: what moves; None for everything
-        unit: resolution of the recorded impulses [N s]
-        shapes: of the bodies that take implicit steps; None where none does
+    ``unit`` is the resolution of the recorded impulses [N s], ``awake`` what moves, None for
+    everything, and ``shapes`` those of bodies that take implicit steps, None where none does.
     """
     n, m = model.n_vert, capacity.contacts
     awake = awake or everything(model)
@@ -121,7 +116,7 @@ def allocate_work(
         f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=wp.zeros(n, dtype=wp.vec3),
         damping=None if shapes else damping.allocate(model),
-        implicit=implicit.allocate(model, shapes, awake) if shapes else None,
+        implicit=implicit.allocate(model, shapes, awake, m) if shapes else None,
         broad_phase=broad,
         narrow_phase=narrow,
         contacts=contacts.allocate(n, m, narrow.n_inside),

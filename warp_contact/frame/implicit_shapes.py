@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
-from warp_contact.kernels.implicit.mobility import FREE, HELD, LUMPED
+from warp_contact.kernels.implicit.bodies import FREE, HELD, LUMPED
 from warp_contact.step.forces import apply_damping, apply_stiffness
 
 SAME = 1e-4  # of the size of a body: how far a vertex of an equal one may be
@@ -19,7 +19,7 @@ KEPT = 4  # lengths of steps of which the inverses are kept
 
 
 def find_shapes(model: Model, x: np.ndarray) -> Shapes:
-    """Which bodies take implicit steps and which are equal; ``x`` are rest positions (n_vert, 3)."""
+    """Which bodies take implicit steps, which are equal; ``x`` are rest positions (n_vert, 3)."""
     kind = np.full(model.n_body, int(LUMPED))
     of_body = np.full(model.n_body, -1)
     placed = np.tile(np.eye(3), (model.n_body, 1, 1))
@@ -69,7 +69,8 @@ class Inverses:
             m = np.repeat(mass[start[b] : start[b + 1]], 3)
             r = shapes.rest[start[b] : start[b + 1]]
             matrices = _assemble(model, b, damped), _assemble(model, b, stiff)
-            self._shapes.append((m, *matrices, free, _rigid_part(m[::3], r) if free.all() else None))
+            rigid = _rigid_part(m[::3], r) if free.all() else None
+            self._shapes.append((m, *matrices, free, rigid))
         self._kept: dict[float, tuple[np.ndarray, np.ndarray]] = {}
 
     def blocks(self, h: float) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,15 @@ from warp_contact.data.model import Model
 from warp_contact.kernels import scan, worlds
 from warp_contact.kernels.broad_phase import bounds, edges, hashing, near, pairs, skins
 from warp_contact.kernels.elastic import shape
-from warp_contact.kernels.impulse import constraint, impulse, pair_impulses, warm_start
+from warp_contact.kernels.implicit import advance, bodies, mobility, predict, solve
+from warp_contact.kernels.impulse import (
+    constraint,
+    coupled,
+    impulse,
+    pair_impulses,
+    rows,
+    warm_start,
+)
 from warp_contact.kernels.motion import lanczos, motion
 from warp_contact.kernels.narrow_phase import (
     contact_graph,
@@ -16,17 +24,21 @@ from warp_contact.kernels.narrow_phase import (
     vertices,
 )
 from warp_contact.kernels.narrow_phase import edges as crossing
-from warp_contact.kernels.surface import closure, residual
+from warp_contact.kernels.surface import closure, coupled_closure, residual
 
 # What a frame of any scene uses. The search for overlaps at the start, other responses, sleeping
 # and measuring are left out: many scenes do not need them.
 ALWAYS = (scan, worlds, bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure)
 ALWAYS += (constraint, impulse, pair_impulses, warm_start, residual)
 ALWAYS += (contact_graph, crossing, depth, persistent, vertex_contact, vertices)
+IMPLICIT = (advance, bodies, mobility, predict, solve, coupled, coupled_closure, rows)
 
 
-def load_kernels(model: Model, device: wp.Device) -> None:
-    """Load what a frame uses on ``device``; where the cache of Warp lacks it, compile it first."""
-    modules = {*ALWAYS, *(e.kernels for e in model.elements)}
+def load_kernels(model: Model, device: wp.Device, implicit: bool) -> None:
+    """Load what a frame uses on ``device``; where the cache of Warp lacks it, compile it first.
+
+    Those of ``implicit`` steps too, where they may be taken.
+    """
+    modules = {*ALWAYS, *(IMPLICIT if implicit else ()), *(e.kernels for e in model.elements)}
     names = sorted(module.__name__ for module in modules)
     wp.force_load(device, [wp.get_module(name) for name in names])

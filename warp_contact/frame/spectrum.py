@@ -43,9 +43,7 @@ class Spectrum:
             times in a few steps, shape (n_world,)
     """
 
-    def __init__(
-        self, model: Model, worlds: Worlds | None = None, implicit: bool = False
-    ) -> None:
+    def __init__(self, model: Model, worlds: Worlds | None = None, implicit: bool = False) -> None:
         """Allocate about 160 bytes per vertex and 84 per tet on the current device.
 
         ``worlds`` are those that do not depend on each other; without them all bodies are one.

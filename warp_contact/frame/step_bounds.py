@@ -10,6 +10,12 @@ relative speed [m/s], t the thickness of the thinnest body [m] and e the shortes
 body [m], all at the start of the frame. LINGERING replaces TRAVEL while there may be overlaps older
 than the step. At the end of the frame the step must still be below ``UNSTABLE`` 2 / omega, and its
 damping within ``damping.reach_for``. A frame that fails is repeated at the rates found there.
+
+Implicit steps are stable whatever omega: it is 0 unless a frame failed. They take
+
+    n       = 2^k >= max(stable, passing, u / (STRIDE e), RESOLVED) / fps
+
+so that few lengths of steps are in use, each with inverses of its own.
 """
 
 import numpy as np
@@ -25,6 +31,8 @@ EXPLODED = 4.0  # times the frequency that the step was chosen for, at most
 REACH = 0.25  # of the thinnest body: the largest relative motion in a step
 PATIENCE = 2.0  # times the stable number of steps: more are not taken for TRAVEL or LINGERING
 BLURRED = 1.05  # times the stable step: its uncertainty
+RESOLVED = 240.0  # implicit steps [1/s] at least: longer ones damp what a frame shows
+STRIDE = 0.5  # as TRAVEL, in implicit steps: they do not crush a tet
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 lets some pass
 # Of the last frame's steps, at least: a step that follows a vibration pumps energy into it.
 KEEP = 0.9
@@ -53,6 +61,13 @@ def steps_in_frame(per_second, fps: float, last):
     """Whole steps in a frame: ``per_second`` [1/s], at least KEEP of the ``last`` frame's."""
     kept = np.floor(KEEP * np.asarray(last))
     return np.maximum(np.maximum(1, kept), np.ceil(per_second / fps)).astype(int)
+
+
+def implicit_steps(omega, speed, thickness, edge, fps: float):
+    """Whole implicit steps in a frame, a power of two; arguments as in ``steps_per_second``."""
+    passing = np.maximum(speed / (REACH * thickness), speed / (STRIDE * edge))
+    per_second = np.maximum(np.maximum(omega / (2.0 * SAFETY), passing), RESOLVED)
+    return 2 ** np.ceil(np.log2(np.maximum(per_second / fps, 1.0))).astype(int)
 
 
 def with_penalty(omega, stiffness: float, damping: float, inv_mass):

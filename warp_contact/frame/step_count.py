@@ -67,11 +67,12 @@ class StepCount:
         if self.wanted:
             return np.full(self._worlds.n, self.wanted)
         omega, speed = self._with_response(omega), self._speed(state)
-        if self._implicit:
-            return np.full(self._worlds.n, 8)
         sizes, overlaps = (self._thickness, self._edge), last.overlapping or self._leaves
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
+        if self._implicit:
+            n = step_bounds.implicit_steps(omega, speed, *sizes, self.fps)
+            n = np.full_like(n, n.max())  # an inverse belongs to one length of the step
         w = int(n.argmax())
         if n[w] > self.most:
             body = int(np.where(self._worlds.of_body == w, of_bodies, -1.0).argmax())

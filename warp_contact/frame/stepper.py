@@ -56,17 +56,15 @@ class Stepper:
         wanted: int | None,
         most: int,
         sleeping: bool,
-        implicit: bool = False,
+        implicit: bool,
     ):
         """Allocate what the steps need, on the current device."""
         self.fps, self.wanted = fps, wanted
-        # Without gravity, a slow body may be in free flight, not at rest.
-        may_sleep = sleeping and any(model.gravity)
+        may_sleep = sleeping and any(model.gravity)  # else a slow body may be in free flight
         self.worlds = Worlds(model, apart=not may_sleep)
         self.last = none_yet(self.worlds.n)
         self.first = state.x.numpy().copy(), state.v.numpy().copy()
         self._model, self._state = model, state
-        self._implicit = implicit
         self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, implicit)
         self.spectrum = Spectrum(model, self.worlds, implicit)
         self.sleeping = Sleeping(model, state, fps) if may_sleep else None

@@ -7,7 +7,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.scan import scan
 from warp_contact.data.work import Work
 from warp_contact.kernels.narrow_phase import contact_graph as kernels
-from warp_contact.step import implicit_impulse
+from warp_contact.step import coupled
 
 
 def order_by_vertex(model: Model, work: Work) -> None:
@@ -40,7 +40,7 @@ def add_parts(model: Model, y: wp.array, work: Work, moves: wp.array) -> None:
     Only in worlds where ``moves``, shape (n_world,), is not 0.
     """
     if work.implicit:
-        return implicit_impulse.add_parts(model, y, work, moves)
+        return coupled.add_parts(model, y, work, moves)
     c = work.contacts
     launch_over(
         kernels.add_parts,

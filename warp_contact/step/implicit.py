@@ -11,7 +11,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.implicit import advance as drifting
-from warp_contact.kernels.implicit import mobility, predict, solve
+from warp_contact.kernels.implicit import bodies, mobility, predict, solve
 from warp_contact.step.forces import apply_damping, apply_stiffness, internal_forces
 
 
@@ -21,14 +21,14 @@ def kick(model: Model, state: State, work: Work) -> None:
     find_mobility(model, state.x, w)
     _find_forces(model, state, work)
     _find_load(model, state, w)
-    _conjugate_gradients(model, state.x, w)
+    _conjugate_gradients(model, state.x, work)
     _rigid_part(model, w.dv, state.x, w)
     inputs = [state.x, w.dv, wp.vec3(*model.gravity), work.dt, w.bodies, w.of]
     wp.launch(predict.kick, model.n_vert, inputs=inputs, outputs=[state.v])
 
 
 def drift(model: Model, state: State, work: Work, out: wp.array, turned: bool = False) -> None:
-    """Set ``out`` to the positions after ``work.dt``; with ``turned``, ``state.v`` to those there."""
+    """Set ``out`` to x after ``work.dt``; with ``turned``, ``state.v`` to the velocities there."""
     w = work.implicit
     _rigid_part(model, state.v, state.x, w)
     given = [work.dt, state.x]
@@ -41,7 +41,7 @@ def drift(model: Model, state: State, work: Work, out: wp.array, turned: bool = 
 def place(model: Model, x: wp.array, w: ImplicitWork) -> None:
     """Let the rigid part of the mobilities be that at ``x``."""
     wp.copy(w.x, x)
-    wp.launch(mobility.find_bodies, model.n_body, inputs=[x], outputs=[w.bodies])
+    wp.launch(bodies.find_bodies, model.n_body, inputs=[x], outputs=[w.bodies])
 
 
 def find_mobility(model: Model, x: wp.array, w: ImplicitWork) -> None:
@@ -49,26 +49,24 @@ def find_mobility(model: Model, x: wp.array, w: ImplicitWork) -> None:
     place(model, x, w)
     d = w.bodies
     inputs = [model.tets, model.pose, model.volume, x, d]
-    wp.launch(mobility.find_gradients, model.n_tet, inputs=inputs, outputs=[w.gradient])
+    wp.launch(bodies.find_gradients, model.n_tet, inputs=inputs, outputs=[w.gradient])
     inputs = [model.vt_start, model.vt_corner, w.gradient]
-    wp.launch(mobility.find_turns, model.n_vert, inputs=inputs, outputs=[d])
+    wp.launch(bodies.find_turns, model.n_vert, inputs=inputs, outputs=[d])
 
 
-def answer(model: Model, p: wp.array, out: wp.array, w: ImplicitWork) -> None:
-    """Set ``out`` = G p for impulses ``p``, shape (n_vert,); 0 for other bodies."""
-    d, n, x = w.bodies, model.n_vert, w.x
-    _respond(model, p, x, w)
-    wp.launch(mobility.to_rest, n, inputs=[p, x, d, w.by, w.busy], outputs=[w.y])
-    wp.launch(mobility.at_rest, model.n_body, inputs=[w.y, d, w.busy], outputs=[w.rest])
-    wp.launch(mobility.multiply, n, inputs=[w.y, d, w.rest, w.busy], outputs=[out])
-    _rigid_part(model, out, x, w)
-    wp.launch(mobility.add_rigid, n, inputs=[x, d, w.of, w.by, w.busy], outputs=[out])
+def answer(
+    model: Model, p: wp.array, out: wp.array, w: ImplicitWork, chosen: wp.array | None = None
+) -> None:
+    """Set ``out`` = G p for impulses ``p``, shape (n_vert,); 0 for bodies without any.
 
-
-def _respond(model: Model, p: wp.array, x: wp.array, w: ImplicitWork) -> None:
-    """Set ``by`` and ``busy`` for impulses ``p``."""
-    outputs = [w.by, w.busy]
-    wp.launch(mobility.response_to, model.n_body, inputs=[p, x, w.bodies], outputs=outputs)
+    Only of the bodies where ``chosen``, shape (n_body,), is not 0; 0 for the others too.
+    """
+    d, n_body, x = w.bodies, model.n_body, w.x
+    inputs = [p, x, d, w.every if chosen is None else chosen]
+    outputs = [w.by, w.rest, w.busy, w.y]
+    wp.launch(mobility.to_rest, n_body, inputs=inputs, outputs=outputs)
+    wp.launch(mobility.multiply, model.n_vert, inputs=[w.y, d, w.rest, w.busy], outputs=[out])
+    wp.launch(mobility.correct, n_body, inputs=[x, d, w.by, w.busy], outputs=[w.of, out])
 
 
 def _rigid_part(model: Model, y: wp.array, x: wp.array, w: ImplicitWork) -> None:
@@ -100,29 +98,28 @@ def _find_load(model: Model, state: State, w: ImplicitWork) -> None:
     at_vertex = [model.vt_start, model.vt_corner, w.stiff]
     inputs = [*at_vertex, w.f, wp.vec3(*model.gravity), d]
     wp.launch(predict.load, n, inputs=inputs, outputs=[w.r])
-    _respond(model, w.r, x, w)
+    wp.launch(mobility.rigid_response, model.n_body, inputs=[w.r, x, d], outputs=[w.by])
     wp.launch(predict.remove_rigid, n, inputs=[x, d, w.by], outputs=[w.r])
 
 
-def _conjugate_gradients(model: Model, x: wp.array, w: ImplicitWork) -> None:
+def _conjugate_gradients(model: Model, x: wp.array, work: Work) -> None:
     """Set ``dv`` from the right-hand side ``r``, which becomes what is left of it."""
+    w = work.implicit
     w.dv.zero_()
     w.running.zero_()
     answer(model, w.r, w.z, w)
     wp.copy(w.p, w.z)
-    inputs = [w.r, w.z, w.bodies]
+    inputs = [w.r, w.z, w.bodies, work.worlds]
     wp.launch(solve.begin, model.n_body, inputs=inputs, outputs=[w.iteration, w.running])
     while_any(w.running, _iterate, model, x, w)
 
 
 def _iterate(model: Model, x: wp.array, w: ImplicitWork) -> None:
-    d, n, n_body, it = w.bodies, model.n_vert, model.n_body, w.iteration
+    n_body, it = model.n_body, w.iteration
     _multiply(model, x, w.p, w.ap, w)
-    wp.launch(solve.find_length, n_body, inputs=[w.p, w.ap, d], outputs=[it])
-    wp.launch(solve.go, n, inputs=[d, it, w.p, w.ap], outputs=[w.dv, w.r])
-    answer(model, w.r, w.z, w)
-    wp.launch(solve.look, n_body, inputs=[w.r, w.z, d], outputs=[it, w.running])
-    wp.launch(solve.find_direction, n, inputs=[d, it, w.z], outputs=[w.p])
+    wp.launch(solve.go, n_body, inputs=[w.p, w.ap, w.bodies], outputs=[it, w.dv, w.r])
+    answer(model, w.r, w.z, w, it.going)
+    wp.launch(solve.look, n_body, inputs=[w.r, w.z, w.bodies], outputs=[it, w.p, w.running])
 
 
 def _multiply(model: Model, x: wp.array, p: wp.array, out: wp.array, w: ImplicitWork) -> None:

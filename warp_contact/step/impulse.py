@@ -14,7 +14,7 @@ from warp_contact.kernels.impulse import constraint, pair_impulses
 from warp_contact.kernels.impulse import impulse as kernels
 from warp_contact.kernels.lengths import IMPULSE_TOLERANCE
 from warp_contact.kernels.worlds import FIRST_LOOK, NO_LOOK
-from warp_contact.step import implicit_impulse, residual, sweeps, warm_start
+from warp_contact.step import coupled, residual, sweeps, warm_start
 from warp_contact.step.contact_graph import order_by_vertex
 from warp_contact.step.narrow_phase import append_edge_contacts
 
@@ -82,7 +82,7 @@ def solve_half_step(model: Model, state: State, work: Work) -> None:
 def apply(model: Model, v: wp.array, work: Work) -> None:
     """Add the parts of the contacts to ``v``, and to the impulses of the frame."""
     if work.implicit:
-        return implicit_impulse.apply(model, v, work)
+        return coupled.apply(model, v, work)
     c = work.contacts
     launch_over(
         kernels.apply_impulses,
@@ -104,6 +104,8 @@ def add_forces(work: Work) -> None:
 
 
 def _sweep_all(model: Model, v: wp.array, work: Work, look: int) -> None:
+    if work.implicit:
+        return coupled.sweep_all(model, v, work, look, _limits().extrapolation)
     sweeps.repeat(work, look, True, _sweep, model, v, work)
 
 
@@ -127,7 +129,7 @@ def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
     c = work.contacts
     order_by_vertex(model, work)
     if work.implicit:
-        implicit_impulse.find_rows(model, work)
+        coupled.begin(model, work)
     launch_over(
         constraint.begin_contacts,
         work.capacity.contacts,
@@ -144,8 +146,6 @@ def _sweep(model: Model, v: wp.array, work: Work) -> None:
         inputs=[_limits(), work.dt, c.n, c.record, c.constraint, s.changed, v],
         outputs=[c.impulse, s.busy, c.part, s.served, work.worlds],
     )
-    if work.implicit:
-        return implicit_impulse.apply_sweep(model, v, work)
     launch_over(
         kernels.apply_sweep,
         model.n_vert,

@@ -15,7 +15,7 @@ from warp_contact.data.work import Work
 from warp_contact.kernels.lengths import OLD_OVERLAP
 from warp_contact.kernels.surface import closure
 from warp_contact.kernels.worlds import FIRST_LOOK, SECOND_LOOK
-from warp_contact.step import residual, search, sweeps
+from warp_contact.step import coupled, residual, search, sweeps
 from warp_contact.step.contact_graph import add_parts
 from warp_contact.step.detection import detect, detect_apart
 
@@ -90,7 +90,10 @@ def _close(model: Model, state: State, work: Work, look: int, deep: float) -> No
         inputs=[search.SEARCH_BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
         outputs=[s.slack, s.push],
     )
-    sweeps.repeat(work, look, False, _sweep, model, state.x, work)
+    if work.implicit:
+        coupled.close(model, state.x, work, look)
+    else:
+        sweeps.repeat(work, look, False, _sweep, model, state.x, work)
     if on("closure torque"):
         launch_over(
             closure.torques,

@@ -1,0 +1,139 @@
+"""Row sums of the contacts where some bodies take implicit steps: bounds for coupled.py.
+
+    t_i = sum_j |G_ij| s_j,  s_j = sum_c |a_c|  over the contacts c of vertex j         [1/kg]
+    W = sum_k |a_k| t_k                                                                 [1/kg]
+
+An impulse on one vertex moves all vertices of such a body, so the sweeps need another bound than
+mass splitting: W bounds the sum of a row of the matrix J G J^T of all contacts, by the triangle
+inequality. Only contacts that may move count, those with an impulse or an approach.
+"""
+
+import warp as wp
+
+from warp_contact.kernels.implicit.bodies import Implicit, moves
+from warp_contact.kernels.narrow_phase.contact import Contact
+from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
+from warp_contact.kernels.options import OPTIONS
+
+wp.set_module_options(OPTIONS)
+
+ROOM = wp.constant(1.1)  # on the row sums: G differs a little from S, of which the norms are
+
+
+@wp.struct
+class Touched:
+    """The vertices of each body that have contacts."""
+
+    n: wp.array[int]  # (n_body,) how many
+    vert: wp.array[int]  # (n_vert,) which, ascending, from the first vertex of their body on
+
+
+@wp.kernel
+def list_touched(
+    # in
+    threads: int,
+    body_vert: wp.array[int],  # (n_body + 1,)
+    graph: ContactGraph,
+    # out
+    to: Touched,
+):
+    """For each body: its vertices with contacts."""
+    for b in range(wp.tid(), body_vert.shape[0] - 1, threads):
+        first = body_vert[b]
+        last = body_vert[b + 1]
+        n = int(0)
+        if graph.start[first] < graph.start[last]:
+            for i in range(first, last):
+                if graph.start[i] < graph.start[i + 1]:
+                    to.vert[first + n] = i
+                    n += 1
+        to.n[b] = n
+
+
+@wp.func
+def share_of(
+    i: int, graph: ContactGraph, contact: wp.array[Contact], counted: wp.array[int]
+) -> float:
+    """Share s of vertex i, over the contacts that count."""
+    s = float(0.0)
+    for e in range(graph.start[i], graph.start[i + 1]):
+        n = graph.entry[e]
+        if counted[n // 5] > 0:
+            s += wp.abs(contact[n // 5].coef[n % 5])
+    return s
+
+
+@wp.func
+def row_sum(i: int, share: wp.array[float], touched: Touched, d: Implicit) -> float:
+    """Row sum t of vertex i [1/kg]."""
+    b = d.vert_body[i]
+    if d.inv_mass[i] == 0.0:
+        return 0.0
+    if not moves(b, d):
+        return d.inv_mass[i] * share[i]
+    first = d.body_vert[b]
+    at = d.first[b] + (i - first) * (d.body_vert[b + 1] - first) - first
+    s = float(0.0)
+    for k in range(touched.n[b]):
+        j = touched.vert[first + k]
+        s += d.norm[at + j] * share[j]
+    return ROOM * s
+
+
+@wp.kernel
+def count_all(
+    # in
+    threads: int,
+    n_contact: wp.array[int],  # (1,)
+    # out
+    counted: wp.array[int],  # (capacity,) 1
+):
+    """For each contact: it counts."""
+    for c in range(wp.tid(), n_contact[0], threads):
+        counted[c] = 1
+
+
+@wp.kernel
+def find_shares(
+    # in
+    threads: int,
+    graph: ContactGraph,
+    contact: wp.array[Contact],  # (capacity,)
+    counted: wp.array[int],  # (capacity,)
+    # out
+    share: wp.array[float],  # (n_vert,) s_j
+    served: wp.array[int],  # (n_vert,) 0: nothing yet
+    changed: wp.array[int],  # (n_vert,) 0: nothing yet
+):
+    """For each vertex with contacts: how much it takes part in those that count."""
+    for k in range(wp.tid(), graph.n_touched[0], threads):
+        i = graph.touched[k]
+        share[i] = share_of(i, graph, contact, counted)
+        served[i] = 0
+        changed[i] = 0
+
+
+@wp.kernel
+def find_rows(
+    # in
+    threads: int,
+    graph: ContactGraph,
+    touched: Touched,
+    share: wp.array[float],  # (n_vert,)
+    d: Implicit,
+    # out
+    row: wp.array[float],  # (n_vert,) t_i
+):
+    """For each vertex with contacts: its row sum."""
+    for k in range(wp.tid(), graph.n_touched[0], threads):
+        i = graph.touched[k]
+        row[i] = row_sum(i, share, touched, d)
+
+
+@wp.func
+def row_weight(c: Contact, row: wp.array[float]) -> float:
+    """W of a contact [1/kg]."""
+    w = float(0.0)
+    for k in range(5):
+        w += wp.abs(c.coef[k]) * row[c.vert[k]]
+    return w

@@ -1,0 +1,79 @@
+"""Whether a scene takes explicit or implicit steps.
+
+An explicit step has to be shorter than the fastest vibration of the stiffest tet, an implicit one
+not. It costs more, damps vibrations that it does not resolve, and needs the inverse of a matrix for
+each shape.
+"""
+
+from dataclasses import dataclass
+
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.frame import step_bounds
+from warp_contact.frame.spectrum import Spectrum
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+
+KINDS = "explicit", "implicit", "auto"
+LARGEST = 800  # vertices of a body: its inverse takes 26 MB and seconds to find
+DEARER = 3.0  # time of an implicit step, in explicit ones
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """What a simulation takes, and why.
+
+    Attributes:
+        implicit: whether steps are implicit
+        why: the reason, for the user
+    """
+
+    implicit: bool
+    why: str
+
+    @property
+    def name(self) -> str:
+        """The word for it."""
+        return "implicit" if self.implicit else "explicit"
+
+
+def choose(
+    wanted: str,
+    model: Model,
+    state: State,
+    response: ContactSurface | Penalty | PredictedForce,
+    sleeping: bool,
+) -> Integrator:
+    """The integrator that the user ``wanted``, or the cheaper one for ``auto``.
+
+    Raises:
+        ValueError: the scene takes no implicit steps
+    """
+    if wanted == "explicit":
+        return Integrator(False, "as asked for")
+    obstacle = _obstacle(model, response, sleeping)
+    if wanted == "implicit":
+        if obstacle:
+            raise ValueError(f"integrator='implicit' is not possible: {obstacle}")
+        return Integrator(True, "as asked for")
+    if obstacle:
+        return Integrator(False, obstacle)
+    spectrum = Spectrum(model)
+    per_second = float(spectrum.rates(state.x)[0].max()) / (2.0 * step_bounds.SAFETY)
+    stiffest = model.labels[int(spectrum.of_bodies[0].argmax())]
+    why = f"body '{stiffest}' would need {per_second:.0f} explicit steps a second"
+    return Integrator(per_second > DEARER * step_bounds.RESOLVED, why)
+
+
+def _obstacle(model: Model, response, sleeping: bool) -> str:
+    """Why implicit steps are not possible; empty if they are."""
+    if not isinstance(response, ContactSurface) or response.search != "balanced":
+        return "only the balanced contact surface takes implicit steps"
+    if sleeping:
+        return "sleeping=True goes with explicit steps"
+    start = model.body_vert.numpy()
+    free = model.inv_mass.numpy() > 0.0
+    for body, label in enumerate(model.labels[: model.n_body]):
+        n = int(start[body + 1] - start[body])
+        if n > LARGEST and free[start[body] : start[body + 1]].any():
+            return f"body '{label}' has {n} vertices, more than {LARGEST}: use a coarser mesh"
+    return ""

@@ -1,0 +1,140 @@
+"""Impulses and displacements of contacts where some bodies take implicit steps."""
+
+from collections.abc import Callable
+
+import warp as wp
+
+from warp_contact.data.launch import launch_over
+from warp_contact.data.model import Model
+from warp_contact.data.work import Work
+from warp_contact.kernels.impulse import coupled as kernels
+from warp_contact.kernels.impulse import rows
+from warp_contact.kernels.impulse.impulse import Limits
+from warp_contact.kernels.surface import coupled_closure as closure
+from warp_contact.step import sweeps
+from warp_contact.step.implicit import answer
+
+TOLERANCE = 1e-4  # of an edge: an approach in a step that needs another sweep
+SWEEPS = 40  # at most
+PASSES = 40  # at most
+
+
+def begin(model: Model, work: Work) -> None:
+    """Set the row sums in ``work.mobility`` over all contacts."""
+    w, c = work.implicit, work.contacts
+    inputs = [model.body_vert, c.graph]
+    launch_over(rows.list_touched, model.n_body, inputs=inputs, outputs=[w.touched])
+    launch_over(rows.count_all, work.capacity.contacts, inputs=[c.n], outputs=[w.counted])
+    _find_rows(model, work)
+
+
+def apply(model: Model, v: wp.array, work: Work) -> None:
+    """Add the parts of the contacts to ``v``, and to the impulses of the frame."""
+    _collect(model, work, work.implicit.every)
+    _record(model, work)
+    _add(model, v, v, work)
+
+
+def add_parts(model: Model, y: wp.array, work: Work, moves: wp.array) -> None:
+    """Add the parts of the contacts to ``y``, in worlds where ``moves`` is not 0."""
+    _collect(model, work, moves)
+    _add(model, y, y, work)
+
+
+def sweep_all(model: Model, v: wp.array, work: Work, look: int, extrapolation: float) -> None:
+    """Change ``v`` by normal impulses and friction until no contact approaches."""
+    w, c = work.implicit, work.contacts
+    inputs = [c.n, c.record, c.constraint, c.impulse, v]
+    launch_over(kernels.find_counted, work.capacity.contacts, inputs=inputs, outputs=[w.counted])
+    limits = Limits()
+    limits.extrapolation, limits.tolerance, limits.sweeps = extrapolation, TOLERANCE, SWEEPS
+    _repeat(model, v, work, look, _solve_contacts, limits)
+    _record(model, work)
+
+
+def close(model: Model, x: wp.array, work: Work, look: int) -> None:
+    """Move ``x`` until no contact overlaps."""
+    w, c = work.implicit, work.contacts
+    inputs = [c.n, c.record, work.surface.slack, x]
+    outputs = [w.ahead, w.counted]
+    launch_over(closure.begin_pushes, work.capacity.contacts, inputs=inputs, outputs=outputs)
+    _repeat(model, x, work, look, _solve_gaps)
+
+
+def _repeat(model: Model, y: wp.array, work: Work, look: int, solve: Callable, *given) -> None:
+    """Change ``y`` in sweeps of touched vertices, then all by the sum of the impulses."""
+    w = work.implicit
+    wp.copy(w.before, y)
+    w.impulse.zero_()
+    _find_rows(model, work)
+    sweeps.repeat(work, look, True, _sweep, model, y, work, solve, *given)
+    _add(model, w.before, y, work)
+
+
+def _sweep(model: Model, y: wp.array, work: Work, solve: Callable, *given) -> None:
+    w, c, s = work.implicit, work.contacts, work.sweeps
+    solve(y, work, *given)
+    launch_over(
+        kernels.respond,
+        model.n_body,
+        inputs=[work.worlds, c.graph, c.record, w.counted, c.part, s.served, w.touched, w.x]
+        + [w.bodies],
+        outputs=[w.busy, w.by, w.y, w.share, w.impulse],
+    )
+    launch_over(
+        kernels.move,
+        model.n_vert,
+        inputs=[work.worlds, work.dt, c.graph, w.touched, w.x, w.y, w.share, w.busy, w.by]
+        + [w.bodies],
+        outputs=[y, work.mobility.row, s.changed],
+    )
+
+
+def _solve_contacts(v: wp.array, work: Work, limits: Limits) -> None:
+    w, c, s = work.implicit, work.contacts, work.sweeps
+    launch_over(
+        kernels.solve_contacts,
+        work.capacity.contacts,
+        inputs=[limits, work.dt, c.n, c.record, c.constraint, work.mobility.row, s.changed, v],
+        outputs=[c.impulse, s.busy, w.counted, c.part, s.served, work.worlds],
+    )
+
+
+def _solve_gaps(x: wp.array, work: Work) -> None:
+    w, c, s = work.implicit, work.contacts, work.surface
+    launch_over(
+        closure.solve_gaps,
+        work.capacity.contacts,
+        inputs=[PASSES, c.n, c.record, c.constraint, s.slack, work.mobility.row, x],
+        outputs=[s.push, w.ahead, w.counted, c.part, work.sweeps.served, work.worlds],
+    )
+
+
+def _find_rows(model: Model, work: Work) -> None:
+    """Set the row sums of the contacts that count."""
+    w, c, s = work.implicit, work.contacts, work.sweeps
+    inputs = [c.graph, c.record, w.counted]
+    outputs = [w.share, s.served, s.changed]
+    launch_over(rows.find_shares, model.n_vert, inputs=inputs, outputs=outputs)
+    inputs = [c.graph, w.touched, w.share, w.bodies]
+    launch_over(rows.find_rows, model.n_vert, inputs=inputs, outputs=[work.mobility.row])
+
+
+def _collect(model: Model, work: Work, moves: wp.array) -> None:
+    w, c = work.implicit, work.contacts
+    w.impulse.zero_()
+    inputs = [c.graph, c.part, work.worlds, moves]
+    launch_over(kernels.collect, model.n_vert, inputs=inputs, outputs=[w.impulse])
+
+
+def _record(model: Model, work: Work) -> None:
+    inputs = [work.contacts.graph, work.implicit.impulse]
+    launch_over(kernels.record, model.n_vert, inputs=inputs, outputs=[work.forces.received])
+
+
+def _add(model: Model, before: wp.array, y: wp.array, work: Work) -> None:
+    """Set ``y`` = ``before`` + G p for the impulses p."""
+    w = work.implicit
+    answer(model, w.impulse, w.answer, w)
+    inputs = [before, w.impulse, w.answer, w.bodies]
+    wp.launch(kernels.add, model.n_vert, inputs=inputs, outputs=[y])

@@ -45,12 +45,16 @@ def multiply(
     stiff: wp.array[wp.vec3],  # (4 n_tet,) corners of K p [N/s]
     damped: wp.array[wp.vec3],  # (4 n_tet,) corners of C p [N]; empty without damping
     d: Implicit,
+    chosen: wp.array[int],  # (n_body,) not 0 where the product is needed; empty if everywhere
     p: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
     product: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
 ):
-    """One thread per vertex: A p; 0 at fixed vertices."""
+    """One thread per vertex: A p of the bodies that are chosen; 0 at fixed vertices."""
     i = wp.tid()
+    if chosen.shape[0] > 0:
+        if chosen[d.vert_body[i]] == 0:
+            return
     product[i] = wp.vec3(0.0, 0.0, 0.0)
     if d.inv_mass[i] > 0.0 and moves(d.vert_body[i], d):
         h = d.h[0]
@@ -69,16 +73,19 @@ def begin(
     worlds: Worlds,
     # out
     to: Iteration,
+    p: wp.array[wp.vec3],  # (n_vert,) [m/s] the first direction, 0 where there is nothing to do
     # out, added to
     running: wp.array[int],  # (1,) bodies that go on
 ):
     """One thread per body: begin to iterate where there is anything to do."""
     b = wp.tid()
     to.going[b] = 0
-    if not moves(b, d):
-        return
     first = d.body_vert[b]
     last = d.body_vert[b + 1]
+    for i in range(first, last):
+        p[i] = wp.vec3(0.0, 0.0, 0.0)
+    if not moves(b, d):
+        return
     mass = wp.float64(0.0)
     for i in range(first, last):
         mass += wp.float64(d.mass[i])
@@ -89,6 +96,8 @@ def begin(
     if rz > to.enough[b]:
         to.going[b] = 1
         wp.atomic_add(running, 0, 1)
+        for i in range(first, last):
+            p[i] = z[i]
 
 
 @wp.kernel
@@ -143,6 +152,8 @@ def look(
     if to.going[b] < 0 or rz <= to.enough[b] or to.going[b] == ITERATIONS:
         to.going[b] = 0
         wp.atomic_sub(running, 0, 1)
+        for i in range(first, last):  # nothing of it is multiplied any more
+            p[i] = wp.vec3(0.0, 0.0, 0.0)
         return
     keep = wp.float32(rz / to.now[b])
     to.now[b] = rz

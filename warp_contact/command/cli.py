@@ -18,6 +18,7 @@ import warp as wp
 from warp_contact import __version__, interrupts
 from warp_contact.command import commands, run
 from warp_contact.errors import SimulationError, UsageError
+from warp_contact.simulation import INTEGRATORS
 
 
 class Parser(argparse.ArgumentParser):
@@ -121,7 +122,7 @@ def add_run(group) -> None:
     )
     add(
         "--integrator",
-        choices=run.INTEGRATORS,
+        choices=INTEGRATORS,
         default="explicit",
         help="steps; default: %(default)s",
     )

@@ -13,9 +13,10 @@ damping within ``damping.reach_for``. A frame that fails is repeated at the rate
 
 Implicit steps are stable whatever omega: it is 0 unless a frame failed. They take
 
-    n       = 2^k >= max(stable, passing, u / (STRIDE e), RESOLVED) / fps
+    n       = 2^k or 3 2^k >= max(stable, u_b / (STRIDE t_b), RESOLVED) / fps
 
-so that few lengths of steps are in use, each with inverses of its own.
+so that few lengths of steps are in use, each with inverses of its own. u_b is the largest speed of
+anything against body b, t_b its thickness.
 """
 
 import numpy as np
@@ -32,7 +33,7 @@ REACH = 0.25  # of the thinnest body: the largest relative motion in a step
 PATIENCE = 2.0  # times the stable number of steps: more are not taken for TRAVEL or LINGERING
 BLURRED = 1.05  # times the stable step: its uncertainty
 RESOLVED = 240.0  # implicit steps [1/s] at least: longer ones damp what a frame shows
-STRIDE = 0.5  # as TRAVEL, in implicit steps: they do not crush a tet
+STRIDE = 0.5  # as REACH, in implicit steps
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 lets some pass
 # Of the last frame's steps, at least: a step that follows a vibration pumps energy into it.
 KEEP = 0.9
@@ -63,11 +64,18 @@ def steps_in_frame(per_second, fps: float, last):
     return np.maximum(np.maximum(1, kept), np.ceil(per_second / fps)).astype(int)
 
 
-def implicit_steps(omega, speed, thickness, edge, fps: float):
-    """Whole implicit steps in a frame, a power of two; arguments as in ``steps_per_second``."""
-    passing = np.maximum(speed / (REACH * thickness), speed / (STRIDE * edge))
-    per_second = np.maximum(np.maximum(omega / (2.0 * SAFETY), passing), RESOLVED)
-    return 2 ** np.ceil(np.log2(np.maximum(per_second / fps, 1.0))).astype(int)
+def implicit_steps(omega, crossing, fps: float):
+    """Whole implicit steps in a frame.
+
+    Args:
+        omega: largest frequency [1/s] of a frame that failed, else 0
+        crossing: largest speed against a body, over its thickness [1/s]
+        fps: frames a second
+    """
+    per_second = np.maximum(np.maximum(omega / (2.0 * SAFETY), crossing / STRIDE), RESOLVED)
+    least = np.maximum(per_second / fps, 1.0)
+    power = 2.0 ** np.floor(np.log2(least))
+    return np.ceil(power * np.select([least <= power, least <= 1.5 * power], [1.0, 1.5], 2.0))
 
 
 def with_penalty(omega, stiffness: float, damping: float, inv_mass):

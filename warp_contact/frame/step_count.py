@@ -71,8 +71,8 @@ class StepCount:
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
         if self._implicit:
-            n = step_bounds.implicit_steps(omega, speed, *sizes, self.fps)
-            n = np.full_like(n, n.max())  # an inverse belongs to one length of the step
+            n = step_bounds.implicit_steps(omega, self._crossing(state), self.fps)
+            n = np.full(len(n), int(n.max()))  # an inverse belongs to one length of the step
         w = int(n.argmax())
         if n[w] > self.most:
             body = int(np.where(self._worlds.of_body == w, of_bodies, -1.0).argmax())
@@ -129,11 +129,37 @@ class StepCount:
             return step_bounds.with_penalty(omega, *given)
         return omega
 
-    def _speed(self, state: State) -> np.ndarray:
-        """Largest relative speed within each world in the frame to come [m/s], shape (n_world,)."""
-        v = state.v.numpy()
+    def _crossing(self, state: State) -> np.ndarray:
+        """Largest speed against a body over its thickness, in each world [1/s], shape (n_world,)."""
+        v, of_body = state.v.numpy().astype(np.float64), self._model.vert_body.numpy()
+        count = np.maximum(np.bincount(of_body), 1)
+        mean = np.stack([np.bincount(of_body, u) / count for u in v.T], axis=1)
+        spread = np.zeros(len(count))
+        np.maximum.at(spread, of_body, np.linalg.norm(v - mean[of_body], axis=1))
+        most, least, fastest = self._extremes(v)
+        box = np.linalg.norm(np.maximum(most - mean, mean - least), axis=1)
+        ball = fastest + np.linalg.norm(mean, axis=1)
+        gained = float(np.linalg.norm(self._model.gravity)) / self.fps
+        speed = np.minimum(box, ball) + spread + gained
+        return self._worlds.most(speed / self._model.body_thickness.numpy())
+
+    def _extremes(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Largest and least velocities and largest speed in the world of each body."""
+        speed = np.zeros(self._worlds.n)
+        np.maximum.at(speed, self._worlds.of_vert, np.linalg.norm(v, axis=1))
+        most, least = self._box(v)
+        of = self._worlds.of_body
+        return most[of], least[of], speed[of]
+
+    def _box(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Largest and least velocities [m/s] of each world, shape (n_world, 3)."""
         most, least = np.full((2, self._worlds.n, 3), -np.inf)
         np.maximum.at(most, self._worlds.of_vert, v)
         np.maximum.at(least, self._worlds.of_vert, -v)
-        speed = np.linalg.norm(most + least, axis=1)
+        return most, -least
+
+    def _speed(self, state: State) -> np.ndarray:
+        """Largest relative speed within each world in the frame to come [m/s], shape (n_world,)."""
+        most, least = self._box(state.v.numpy())
+        speed = np.linalg.norm(most - least, axis=1)
         return speed + float(np.linalg.norm(self._model.gravity)) / self.fps

@@ -89,7 +89,7 @@ def _find_load(model: Model, state: State, w: ImplicitWork) -> None:
     of_fixed = w.none
     if w.any_held:
         wp.launch(predict.at_fixed, n, inputs=[d, v], outputs=[w.p])
-        _multiply(model, x, w.p, w.ap, w)
+        _multiply(model, x, w.p, w.ap, w, w.every)
         of_fixed = w.ap
     wp.launch(predict.momenta, n, inputs=[d, v, of_fixed], outputs=[w.r])
     answer(model, w.r, w.z, w)
@@ -108,25 +108,27 @@ def _conjugate_gradients(model: Model, x: wp.array, work: Work) -> None:
     w.dv.zero_()
     w.running.zero_()
     answer(model, w.r, w.z, w)
-    wp.copy(w.p, w.z)
     inputs = [w.r, w.z, w.bodies, work.worlds]
-    wp.launch(solve.begin, model.n_body, inputs=inputs, outputs=[w.iteration, w.running])
+    outputs = [w.iteration, w.p, w.running]
+    wp.launch(solve.begin, model.n_body, inputs=inputs, outputs=outputs)
     while_any(w.running, _iterate, model, x, w)
 
 
 def _iterate(model: Model, x: wp.array, w: ImplicitWork) -> None:
     n_body, it = model.n_body, w.iteration
-    _multiply(model, x, w.p, w.ap, w)
+    _multiply(model, x, w.p, w.ap, w, it.going)
     wp.launch(solve.go, n_body, inputs=[w.p, w.ap, w.bodies], outputs=[it, w.dv, w.r])
     answer(model, w.r, w.z, w, it.going)
     wp.launch(solve.look, n_body, inputs=[w.r, w.z, w.bodies], outputs=[it, w.p, w.running])
 
 
-def _multiply(model: Model, x: wp.array, p: wp.array, out: wp.array, w: ImplicitWork) -> None:
-    """Set ``out`` = A(x) p."""
+def _multiply(
+    model: Model, x: wp.array, p: wp.array, out: wp.array, w: ImplicitWork, chosen: wp.array
+) -> None:
+    """Set ``out`` = A(x) p of bodies that are ``chosen``; ``p`` is 0 in the others."""
     apply_stiffness(model, x, p, w.stiff)
     _apply_damping(model, x, p, w)
-    inputs = [model.vt_start, model.vt_corner, w.stiff, w.damped, w.bodies, p]
+    inputs = [model.vt_start, model.vt_corner, w.stiff, w.damped, w.bodies, chosen, p]
     wp.launch(solve.multiply, model.n_vert, inputs=inputs, outputs=[out])
 
 

@@ -130,7 +130,7 @@ class StepCount:
         return omega
 
     def _crossing(self, state: State) -> np.ndarray:
-        """Largest speed against a body over its thickness, in each world [1/s], shape (n_world,)."""
+        """Largest speed against a body over its thickness [1/s], in each world, (n_world,)."""
         v, of_body = state.v.numpy().astype(np.float64), self._model.vert_body.numpy()
         count = np.maximum(np.bincount(of_body), 1)
         mean = np.stack([np.bincount(of_body, u) / count for u in v.T], axis=1)

@@ -14,6 +14,23 @@ LEAF = 8  # triangles in a leaf: a query for the few near a vertex takes a quart
 
 
 @dataclass
+class Travel:
+    """How far bodies have moved from one detection pass to the next.
+
+    Attributes:
+        last: positions of the last pass [m], shape (n_vert,)
+        motion: largest motion of each body since then [m], shape (n_body,)
+        recent: largest of the last motions, older ones count less [m], shape (n_body,)
+        travelled: sum of the motions since the pairs were found [m], shape (n_body + n_plane,)
+    """
+
+    last: wp.array[wp.vec3]
+    motion: wp.array[float]
+    recent: wp.array[float]
+    travelled: wp.array[float]
+
+
+@dataclass
 class Pairs:
     """Vertices (or edges) and the bodies whose tets (or triangles) they may come to meet.
 
@@ -22,11 +39,15 @@ class Pairs:
         item_start: first item of each owner, shape (n_owner + 1,)
         clear_until: distance travelled by both bodies, before which they do not meet [m],
             shape (capacity,)
+        travel: of the bodies between the passes over these pairs. Vertices are looked at where
+            they would go without contact, edges where impulses lead: bodies at rest swing between
+            the two, though the places of edges hardly change
     """
 
     list: PairList
     item_start: wp.array[int]
     clear_until: wp.array[float]
+    travel: Travel
 
     @property
     def n(self) -> wp.array[int]:
@@ -42,16 +63,12 @@ class BroadPhase:
         x: positions at which the pairs were found [m], shape (n_vert,)
         free: how far from ``x`` a prediction may be [m], shape (n_body,)
         skin: how far from ``x`` the pairs hold [m], shape (n_body,)
-        motion: largest motion of each body since the last detection pass [m], shape (n_body,)
-        recent: largest of the last motions, older ones count less [m], shape (n_body,)
         fastest: largest of the motions when the pairs were found [m], shape (1,)
         total: their sum, in counts of skins.py, shape (1,)
         stale: whether the pairs have to be found again, shape (1,)
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
         any_pair: whether there are any, shape (1,)
-        last: positions of the last detection pass [m], shape (n_vert,)
-        travelled: sum of the motions since the pairs were found [m], shape (n_body + n_plane,)
         n_found: length of the list that is being filled, shape (1,)
         vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
         near: the bodies that may touch a body
@@ -68,16 +85,12 @@ class BroadPhase:
     x: wp.array[wp.vec3]
     free: wp.array[float]
     skin: wp.array[float]
-    motion: wp.array[float]
-    recent: wp.array[float]
     fastest: wp.array[float]
     total: wp.array[int]
     stale: wp.array[int]
     verts: Pairs
     edges: Pairs
     any_pair: wp.array[int]
-    last: wp.array[wp.vec3]
-    travelled: wp.array[float]
     n_found: wp.array[int]
     vert_tet: wp.array[wp.vec2i]
     edge_tri: wp.array[wp.vec2i]
@@ -102,16 +115,12 @@ def allocate(model: Model, x: wp.array[wp.vec3], capacity: Capacity) -> BroadPha
         x=wp.zeros(n, dtype=wp.vec3),
         free=wp.zeros(n_body, dtype=float),
         skin=wp.zeros(n_body, dtype=float),
-        motion=wp.zeros(n_body, dtype=float),
-        recent=wp.zeros(n_body, dtype=float),
         fastest=wp.zeros(1, dtype=float),
         total=wp.zeros(1, dtype=int),
         stale=wp.full(1, 1, dtype=int),
-        verts=_pairs(n, capacity.verts, capacity.tets),
-        edges=_pairs(model.n_edge, capacity.edges, capacity.tris),
+        verts=_pairs(model, n, capacity.verts, capacity.tets),
+        edges=_pairs(model, model.n_edge, capacity.edges, capacity.tris),
         any_pair=wp.zeros(1, dtype=int),
-        last=wp.zeros(n, dtype=wp.vec3),
-        travelled=wp.zeros(n_body + model.n_plane, dtype=float),
         n_found=wp.zeros(1, dtype=int),
         vert_tet=wp.zeros(capacity.tets, dtype=wp.vec2i),
         edge_tri=wp.zeros(capacity.tris, dtype=wp.vec2i),
@@ -159,7 +168,7 @@ def _near(
     return near
 
 
-def _pairs(n_owner: int, n_pair: int, n_item: int) -> Pairs:
+def _pairs(model: Model, n_owner: int, n_pair: int, n_item: int) -> Pairs:
     pairs = PairList()
     pairs.n = wp.zeros(1, dtype=int)
     pairs.pair = wp.zeros(n_pair, dtype=wp.vec2i)
@@ -170,4 +179,10 @@ def _pairs(n_owner: int, n_pair: int, n_item: int) -> Pairs:
         list=pairs,
         item_start=wp.zeros(n_owner + 1, dtype=int),
         clear_until=wp.zeros(n_pair, dtype=float),
+        travel=Travel(
+            last=wp.zeros(model.n_vert, dtype=wp.vec3),
+            motion=wp.zeros(model.n_body, dtype=float),
+            recent=wp.zeros(model.n_body, dtype=float),
+            travelled=wp.zeros(model.n_body + model.n_plane, dtype=float),
+        ),
     )

@@ -8,7 +8,7 @@ from functools import partial
 import warp as wp
 
 from warp_contact.data import boxes
-from warp_contact.data.broad_phase import Pairs
+from warp_contact.data.broad_phase import Pairs, Travel
 from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.scan import scan
@@ -32,21 +32,21 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     if_any(b.stale, _find, model, x0, x1, work)
 
 
-def track(model: Model, x: wp.array, work: Work) -> None:
+def track(model: Model, x: wp.array, travel: Travel, work: Work) -> None:
     """Begin a detection pass at ``x``: add the distances travelled; no contact is new yet."""
-    b = work.broad_phase
-    _move(model, x, work)
-    outputs = [b.motion, b.recent, b.travelled, work.narrow_phase.new]
+    _move(model, x, travel)
+    outputs = [travel.motion, travel.recent, travel.travelled, work.narrow_phase.new]
     wp.launch(skins.add_motion, dim=model.n_body, inputs=[], outputs=outputs)
 
 
 def _find(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     b = work.broad_phase
     wp.copy(b.x, x0)
-    wp.copy(b.last, x0)
-    b.travelled.zero_()
-    b.verts.clear_until.fill_(-1.0)
-    b.edges.clear_until.fill_(-1.0)
+    for pairs in (b.verts, b.edges):
+        wp.copy(pairs.travel.last, x0)
+        pairs.travel.motion.zero_()
+        pairs.travel.travelled.zero_()
+        pairs.clear_until.fill_(-1.0)
     _choose_skins(model, x1, work)
     if model.n_plane:
         _list_pairs(model, work)
@@ -69,34 +69,33 @@ def _list_none(work: Work) -> None:
         pairs.item_start.zero_()
 
 
-def _move(model: Model, x: wp.array, work: Work) -> None:
+def _move(model: Model, x: wp.array, travel: Travel) -> None:
     """Update ``motion`` by the motion up to ``x``."""
-    b = work.broad_phase
     chunks = -(-model.n_vert // int(skins.CHUNK))
     inputs = [model.vert_body, x]
-    wp.launch(skins.find_motion, dim=chunks, inputs=inputs, outputs=[b.last, b.motion])
+    wp.launch(skins.find_motion, dim=chunks, inputs=inputs, outputs=[travel.last, travel.motion])
 
 
 def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
     """Set ``free`` and ``skin`` for a step to ``x1``, ``near`` and the boxes of the bodies."""
     b, edge = work.broad_phase, work.mesh.shortest_edge
-    b.motion.zero_()
+    motion = b.verts.travel.motion
     b.fastest.zero_()
-    _move(model, x1, work)
+    _move(model, x1, b.verts.travel)
     b.total.zero_()
     wp.launch(
         skins.find_fastest,
         dim=model.n_body,
-        inputs=[edge, b.motion],
+        inputs=[edge, motion],
         outputs=[b.fastest, b.total],
     )
-    inputs = [edge, b.fastest, b.motion]
+    inputs = [edge, b.fastest, motion]
     wp.launch(skins.widest_skins, dim=model.n_body, inputs=inputs, outputs=[b.skin])
     _find_near(model, work)
     wp.launch(
         skins.choose_skins,
         dim=model.n_body,
-        inputs=[edge, b.total, b.motion, b.near],
+        inputs=[edge, b.total, motion, b.near],
         outputs=[b.free, b.skin, b.stale, b.any_pair],
     )
     _find_near(model, work)

@@ -92,12 +92,12 @@ def _find_vertices(model: Model, x0: wp.array, x: wp.array, work: Work, apart: b
 
 def _find_penetrations(model: Model, x: wp.array, work: Work) -> None:
     """Set the vertices inside other bodies at ``x``, sorted by vertex and body."""
-    track(model, x, work)
     b, n = work.broad_phase, work.narrow_phase
+    track(model, x, b.verts.travel, work)
     launch_over(
         vertices.find_penetrations,
         work.capacity.verts,
-        inputs=[work.mesh, b.verts.list, b.travelled, x],
+        inputs=[work.mesh, b.verts.list, b.verts.travel.travelled, x],
         outputs=[b.verts.clear_until, n.inside_at],
     )
     scan(n.inside_at, work.scan, inclusive=False)
@@ -111,12 +111,13 @@ def _find_penetrations(model: Model, x: wp.array, work: Work) -> None:
 
 def _find_edges(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool) -> None:
     def find() -> None:
-        track(model, x, work)
-        b = work.broad_phase
+        b, travel = work.broad_phase, work.broad_phase.edges.travel
+        track(model, x, travel, work)
         launch_over(
             edges.find_crossings,
             work.capacity.edges,
-            inputs=[apart, work.mesh, b.edges.list, b.skin, b.recent, b.travelled, x0, x],
+            inputs=[apart, work.mesh, b.edges.list, b.skin, travel.recent, travel.travelled]
+            + [x0, x],
             outputs=[b.edges.clear_until, n.place, n.found, n.crossing_at]
             + [n.n_place, n.n_new, work.worlds],
         )

@@ -2,7 +2,8 @@
 
 The gap of a vertex is that to a point of its triangle, along a direction that may not be the normal
 of the triangle. A vertex that has slid may therefore overlap this or another triangle although this
-gap shows no overlap.
+gap shows no overlap. Within a step it can come to lie no deeper below another one than it has moved
+relative to its own, as it overlapped none before.
 """
 
 import warp as wp
@@ -10,7 +11,7 @@ import warp as wp
 from warp_contact.kernels.geometry import projected_weights
 from warp_contact.kernels.impulse.constraint import Constraint
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, OLD_OVERLAP
-from warp_contact.kernels.narrow_phase.contact import Contact, gap
+from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.worlds import FIRST_LOOK, Worlds
 
@@ -67,12 +68,14 @@ def find_strays(
     threads: int,
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
+    dt: wp.array[float],  # (n_vert,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s] by which they moved in the step
     # out, added to
     worlds: Worlds,  # those with an overlap to be closed
     found: wp.array[int],  # (3 + n_world,) 1 for an overlap
 ):
-    """For each contact of a vertex with a triangle: whether the vertex left it, or lies below."""
+    """For each contact of a vertex with a triangle: whether it slid off it, or lies below it."""
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
         if at.coef[0] != 1.0 or at.on_plane:
@@ -85,7 +88,9 @@ def find_strays(
         t2 = x[at.vert[4]]
         face = wp.normalize(wp.cross(t1 - t0, t2 - t0))
         w = projected_weights(p, at.normal, t0, t1, t2)
-        below = wp.dot(p - t0, face) < -CLOSURE_TOLERANCE * at.edge_length
-        if wp.min(w) < -STRAY or below:
+        least = CLOSURE_TOLERANCE * at.edge_length
+        below = wp.dot(p - t0, face) < -least
+        slid = dt[at.vert[0]] * wp.length(relative_velocity(at, v)) > least
+        if below or (slid and wp.min(w) < -STRAY):
             worlds.open[worlds.of_vert[at.vert[0]]] = FIRST_LOOK
             found[OPEN] = 1

@@ -36,12 +36,15 @@ def add_gaps(model: Model, x: wp.array, work: Work, look: int = FIRST_LOOK) -> N
     )
 
 
-def add_strays(model: Model, x: wp.array, work: Work) -> None:
-    """Count vertices that left the triangle of their contact, or lie below it, as overlaps."""
+def add_strays(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
+    """Count vertices that slid off the triangle of their contact, or lie below it, as overlaps.
+
+    ``v`` are the velocities by which they came to ``x`` in this step.
+    """
     c = work.contacts
     launch_over(
         kernels.find_strays,
         work.capacity.contacts,
-        inputs=[c.n, c.record, x],
+        inputs=[c.n, c.record, work.dt, x, v],
         outputs=[work.worlds, work.surface.found],
     )

@@ -24,7 +24,7 @@ def close_gaps(model: Model, state: State, work: Work) -> None:
     """Close the residual overlaps, where bodies were apart when the step began."""
     residual.add_gaps(model, state.x, work)
     if on("strays"):
-        residual.add_strays(model, state.x, work)
+        residual.add_strays(model, state.x, state.v, work)
     if_any(work.surface.any_open, _close_gaps, model, state, work)
 
 

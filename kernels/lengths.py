@@ -21,6 +21,7 @@ OLD_OVERLAP = wp.constant(1.0e-3)  # at the start of a step: a deeper one is for
 SAME_PLACE = wp.constant(1.0e-3)  # surfaces closer than this show no overlap to search
 STALE_OVERLAP = wp.constant(2.0e-3)  # at the start of a step: a deeper one means a wrong direction
 UNHELD = wp.constant(1.0e-2)  # a smaller overlap needs no contact
+SHALLOW = wp.constant(2.0e-2)  # of depths: a normal turns little over a shorter way
 NEAR_WALL = wp.constant(5.0e-2)  # a vertex this close to a wall may lie flush in it
 
 # Motion. Those of the broad phase and of steps are of the shortest edge.

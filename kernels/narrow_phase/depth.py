@@ -21,6 +21,7 @@ import warp as wp
 
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.opposing import looks_against
+from warp_contact.kernels.narrow_phase.shallow import ABOVE, BELOW, place_of, shallow_depth
 from warp_contact.kernels.narrow_phase.surface_query import corner_normals, first_hit, hit_point
 from warp_contact.kernels.narrow_phase.vertices import Penetration, is_inside_of, penetrations_of
 from warp_contact.kernels.options import OPTIONS
@@ -30,56 +31,81 @@ wp.set_module_options(OPTIONS)
 GRAZING = wp.constant(5.0e-3)  # sine below which a tet edge lies in a wall and does not cross it
 
 
+@wp.func
+def edge_depth(
+    e: Penetration,
+    mesh: Mesh,
+    x: wp.array[wp.vec3],
+    pair_start: wp.array[int],
+    inside_at: wp.array[int],
+    penetration: wp.array[Penetration],
+) -> Penetration:
+    """The penetration with depth and direction from the crossing tet edges, if there are any."""
+    root = wp.bvh_get_group_root(mesh.bvh, e.body)
+    i = e.vert
+    p = x[i]
+    weight = float(0.0)
+    depth = float(0.0)
+    r = wp.vec3(0.0, 0.0, 0.0)
+    normals = wp.mat33()  # of the triangle crossed last: most edges cross the same one
+    crossed = int(-1)
+    for k in range(mesh.vn_start[i], mesh.vn_start[i + 1]):
+        j = mesh.vn_vert[k]
+        if not is_inside_of(j, e.body, pair_start, inside_at, penetration):
+            u = p - x[j]
+            hit = first_hit(mesh.bvh, root, mesh.tris, x, x[j], u, -1.0e-6, -1.0, GRAZING)
+            if hit.tri >= 0:
+                if hit.tri != crossed:
+                    crossed = hit.tri
+                    t = mesh.tris[crossed]
+                    normals = corner_normals(t, mesh.tris, mesh.vs_start, mesh.vs_tri, x)
+                n = wp.normalize(normals * hit.w)
+                gap = hit_point(hit, mesh.tris, x) - p
+                d = wp.dot(gap, n)
+                if d > 0.0 and looks_against(i, n, mesh.tris, mesh.vs_start, mesh.vs_tri, x):
+                    w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-12 * wp.length_sq(u))
+                    weight += w
+                    depth += w * d
+                    r += w * n
+    if weight > 0.0 and wp.length_sq(r) > 1.0e-6 * weight * weight:
+        e.depth = depth / weight
+        e.direction = wp.normalize(r)
+        e.layer = 0
+    return e
+
+
 @wp.kernel
 def border_depth(
     # in
     threads: int,
+    shallow: float,  # of an edge: how far a depth is looked for without the edges
     mesh: Mesh,
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     pair_start: wp.array[int],  # (n_vert + 1,) first pair of each vertex
     inside_at: wp.array[int],  # (n_pair + 1,) penetrations before each pair
     # in, out
-    penetration: wp.array[Penetration],  # (capacity,) layer 0 at the border, others untouched
+    penetration: wp.array[Penetration],  # (capacity,) layer 0 at the border
     # out, added to
     pending: wp.array[int],  # (1,) 1 when some penetration has no depth yet
 ):
-    """For each penetration: depth and direction from the crossing tet edges."""
+    """For each penetration: depth and direction at the border, by the tet edges that cross it."""
     n_inside = wp.min(inside_at[inside_at.shape[0] - 1], penetration.shape[0])
     for e in range(wp.tid(), n_inside, threads):
-        i = penetration[e].vert
-        body = penetration[e].body
-        if body >= mesh.n_body:
+        found = penetration[e]
+        if found.body >= mesh.n_body:
             continue
-        root = wp.bvh_get_group_root(mesh.bvh, body)
-        p = x[i]
-        weight = float(0.0)
-        depth = float(0.0)
-        r = wp.vec3(0.0, 0.0, 0.0)
-        normals = wp.mat33()  # of the triangle crossed last: most edges cross the same one
-        crossed = int(-1)
-        for k in range(mesh.vn_start[i], mesh.vn_start[i + 1]):
-            j = mesh.vn_vert[k]
-            if not is_inside_of(j, body, pair_start, inside_at, penetration):
-                u = p - x[j]
-                hit = first_hit(mesh.bvh, root, mesh.tris, x, x[j], u, -1.0e-6, -1.0, GRAZING)
-                if hit.tri >= 0:
-                    if hit.tri != crossed:
-                        crossed = hit.tri
-                        t = mesh.tris[crossed]
-                        normals = corner_normals(t, mesh.tris, mesh.vs_start, mesh.vs_tri, x)
-                    n = wp.normalize(normals * hit.w)
-                    gap = hit_point(hit, mesh.tris, x) - p
-                    d = wp.dot(gap, n)
-                    if d > 0.0 and looks_against(i, n, mesh.tris, mesh.vs_start, mesh.vs_tri, x):
-                        w = 1.0 / wp.max(wp.length_sq(gap), 1.0e-12 * wp.length_sq(u))
-                        weight += w
-                        depth += w * d
-                        r += w * n
-        if weight > 0.0 and wp.length_sq(r) > 1.0e-6 * weight * weight:
-            penetration[e].depth = depth / weight
-            penetration[e].direction = wp.normalize(r)
-            penetration[e].layer = 0
-        else:
+        reach = shallow * mesh.body_edge[found.body]
+        root = wp.bvh_get_group_root(mesh.bvh, found.body)
+        at = place_of(found.vert, root, reach, mesh, x)
+        if at.side == BELOW:
+            found = shallow_depth(found, at, reach, mesh, x, pair_start, inside_at, penetration)
+        if at.side == ABOVE:
+            found.side = ABOVE
+            found.hit = at.hit
+        elif found.layer < 0:
+            found = edge_depth(found, mesh, x, pair_start, inside_at, penetration)
+        penetration[e] = found
+        if found.layer < 0:
             pending[0] = 1
 
 

@@ -147,6 +147,30 @@ def first_crossing(
 
 
 @wp.func
+def leaves_earlier(
+    best: Hit,
+    k: int,
+    tris: wp.array[wp.vec3i],
+    x: wp.array[wp.vec3],
+    p: wp.vec3,
+    r: wp.vec3,  # unit
+) -> Hit:
+    """The first hit where the ray p + t r, t >= 0, leaves the body, with triangle k included."""
+    out = best
+    a = x[tris[k][0]]
+    b = x[tris[k][1]]
+    c = x[tris[k][2]]
+    n = wp.cross(b - a, c - a)
+    if wp.dot(r, n) > OBLIQUE * wp.length(n):
+        h = segment_hit(p, r, a, b, c, PARALLEL)
+        if h[0] >= 0.0 and (h[0] < best.t or (h[0] == best.t and k < best.tri)):
+            out.tri = k
+            out.t = h[0]
+            out.w = weights3(h)
+    return out
+
+
+@wp.func
 def leaving_hit(
     surface: wp.uint64,
     root: int,
@@ -162,16 +186,7 @@ def leaving_hit(
     k = int(0)
     query = wp.bvh_query_ray(surface, p, r, root)
     while wp.bvh_query_next(query, k, best.t):
-        a = x[tris[k][0]]
-        b = x[tris[k][1]]
-        c = x[tris[k][2]]
-        n = wp.cross(b - a, c - a)
-        if wp.dot(r, n) > OBLIQUE * wp.length(n):
-            h = segment_hit(p, r, a, b, c, PARALLEL)
-            if h[0] >= 0.0 and (h[0] < best.t or (h[0] == best.t and k < best.tri)):
-                best.tri = k
-                best.t = h[0]
-                best.w = weights3(h)
+        best = leaves_earlier(best, k, tris, x, p, r)
     return best
 
 

@@ -23,6 +23,7 @@ from warp_contact.kernels.lengths import FLUSH, NEAR_WALL, STALE_OVERLAP, VERTEX
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.opposing import along, closest_opposing, looks
+from warp_contact.kernels.narrow_phase.shallow import ABOVE, BELOW
 from warp_contact.kernels.narrow_phase.surface_query import (
     Hit,
     closest_hit,
@@ -70,17 +71,18 @@ def inner_contact(
     tris: wp.array[wp.vec3i],
     x0: wp.array[wp.vec3],
     x: wp.array[wp.vec3],
-    i: int,
-    layer: int,
-    depth: float,  # [m]
-    r: wp.vec3,
+    e: Penetration,
     edge: float,  # [m]
 ) -> VertexContact:
-    """The contact where the ray of vertex i along its direction leaves the body."""
+    """The contact where the ray of a vertex along its direction leaves the body."""
     out = VertexContact()
-    if layer < 0 or depth <= 0.0:
+    i = e.vert
+    r = e.direction
+    if e.layer < 0 or e.depth <= 0.0:
         return out
-    ray = leaving_hit(surface, root, tris, x, x[i], r)
+    ray = e.hit
+    if e.side != BELOW or ray.tri < 0:
+        ray = leaving_hit(surface, root, tris, x, x[i], r)
     if ray.tri < 0:  # in the margin, outside the body: cast it from just inside
         near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
         inner = hit_point(near, tris, x) - 2.0 * VERTEX_MARGIN * edge * face_normal(
@@ -93,7 +95,7 @@ def inner_contact(
             own = projected_weights(x[i], r, x[t[0]], x[t[1]], x[t[2]])
             if wp.length(own - ray.w) > BESIDE:
                 return out
-    if ray.tri >= 0 and ray.t > 0.0 and ray.t <= TRUSTED * depth + NEAR_WALL * edge:
+    if ray.tri >= 0 and ray.t > 0.0 and ray.t <= TRUSTED * e.depth + NEAR_WALL * edge:
         out = contact_at(ray, i, r, tris, x0)
     return out
 
@@ -107,17 +109,20 @@ def closest_contact(
     vs_tri: wp.array[int],
     x0: wp.array[wp.vec3],
     x: wp.array[wp.vec3],
-    i: int,
+    e: Penetration,
     edge: float,  # [m]
 ) -> VertexContact:
-    """The contact of vertex i with the closest point of the surface."""
+    """The contact of a vertex with the closest point of the surface."""
     out = VertexContact()
-    near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
-    inside = inner_side(near, tris, x, x[i])
-    if inside <= FLUSH * edge:
-        near = closest_opposing(
-            surface, root, tris, vs_start, vs_tri, x, i, 2.0 * VERTEX_MARGIN * edge
-        )
+    i = e.vert
+    margin = 2.0 * VERTEX_MARGIN * edge
+    near = e.hit
+    if e.side != ABOVE:
+        near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
+        if inner_side(near, tris, x, x[i]) <= FLUSH * edge:
+            near = closest_opposing(surface, root, tris, vs_start, vs_tri, x, i, margin)
+    elif near.t >= margin:
+        return out
     if near.tri < 0:
         return out
     n = face_normal(tris[near.tri], x)
@@ -169,10 +174,10 @@ def found_contact(
     edge = mesh.body_edge[e.body]
     stale = -STALE_OVERLAP * edge
     root = wp.bvh_get_group_root(mesh.bvh, e.body)
-    out = inner_contact(mesh.bvh, root, mesh.tris, x0, x, i, e.layer, e.depth, e.direction, edge)
+    out = inner_contact(mesh.bvh, root, mesh.tris, x0, x, e, edge)
     if not out.found or (apart and out.start < stale):
         near = closest_contact(
-            mesh.bvh, root, mesh.tris, mesh.vs_start, mesh.vs_tri, x0, x, i, edge
+            mesh.bvh, root, mesh.tris, mesh.vs_start, mesh.vs_tri, x0, x, e, edge
         )
         if near.found and not (out.found and out.start >= near.start):
             out = near

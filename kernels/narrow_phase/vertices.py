@@ -14,6 +14,7 @@ from warp_contact.kernels.broad_phase.skins import CAREFUL
 from warp_contact.kernels.geometry import NONE, tet_weights, triangle_closest
 from warp_contact.kernels.lengths import VERTEX_MARGIN
 from warp_contact.kernels.mesh import Mesh
+from warp_contact.kernels.narrow_phase.surface_query import Hit
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -83,6 +84,8 @@ class Penetration:
     layer: int  # of the propagation, -1: no depth yet
     depth: float  # [m]
     direction: wp.vec3  # out of the body
+    side: int  # of the triangles next to it: UNSURE, ABOVE or BELOW of shallow.py
+    hit: Hit  # BELOW where its direction leaves the body, ABOVE the closest point that it opposes
 
 
 @wp.kernel
@@ -149,6 +152,7 @@ def list_penetrations(
         found.vert = pairs.pair[c][0]
         found.body = pairs.pair[c][1]
         found.layer = wp.where(found.body >= n_body, 0, -1)
+        found.hit.tri = -1
         penetration[e] = found
 
 

@@ -6,6 +6,7 @@ from warp_contact.data.launch import launch_over, while_any
 from warp_contact.data.model import Model
 from warp_contact.data.switches import on
 from warp_contact.data.work import Work
+from warp_contact.kernels.lengths import SHALLOW
 from warp_contact.kernels.narrow_phase import depth as kernels
 
 
@@ -15,7 +16,7 @@ def find_depths(model: Model, x: wp.array, work: Work) -> None:
     launch_over(
         kernels.border_depth,
         work.capacity.contacts,
-        inputs=[work.mesh, x, work.broad_phase.verts.list.start, n.inside_at],
+        inputs=[SHALLOW, work.mesh, x, work.broad_phase.verts.list.start, n.inside_at],
         outputs=[n.penetration, n.pending],
     )
     if on("layers"):

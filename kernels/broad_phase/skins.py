@@ -7,12 +7,14 @@ position of a vertex is further away than ``free``. The rest of the skin is a re
 impulses and the closure add within a step: they may stop the body, and its neighbours may push it.
 New pairs are also found when a body moves further than FASTER reserves in a step.
 
-    free    = max(looks d, LEAST_SKIN e / 2) + D / 2     [m]
-    reserve = max(d, LEAST_SKIN e / 2) + D / 2           [m]     skin = free + reserve
+    free    = max(looks r, LEAST_SKIN e / 2) + (d - r) + D / 2   [m]
+    reserve = max(d, LEAST_SKIN e / 2) + D / 2                   [m]     skin = free + reserve
 
-d is the largest motion of the body in a step, D that of the bodies near it, e the shortest edge of
-its world. ``looks`` is the number of steps that the pairs should last. It is the same for all
-bodies, and such that looks d is MEAN_SKIN edges on average. A few fast
+d is the largest predicted motion of the body in a step, D that of the bodies near it, e the shortest
+edge of its world. r is the motion that is left of d where contacts take the rest, as at rest: the
+larger one of the last motions under impulses and of the mean motion since pairs were last found.
+``looks`` is the number of steps that the pairs should last. It is the same for all
+bodies, and such that looks r is MEAN_SKIN edges on average. A few fast
 bodies then do not use up the pairs of a pile at rest, and skins stay narrow where all bodies are
 fast. A vibrating body stays near its place, so its pairs last longer. A body with nothing near it,
 even with LONGEST for all, gets LONGEST.
@@ -51,9 +53,12 @@ def moved(
     x1: wp.array[wp.vec3],  # (n_vert,) [m]
     # out, added to
     stale: wp.array[int],  # (1,) 1 when the pairs have to be found again
+    age: wp.array[int],  # (1,) steps since they were found
 ):
     """One thread per vertex: whether it is beyond ``free``, or too fast for the reserve."""
     i = wp.tid()
+    if i == 0:
+        age[0] = age[0] + 1
     d = wp.max(wp.length_sq(x0[i] - built[i]), wp.length_sq(x1[i] - built[i]))
     most = free[vert_body[i]]
     fast = FASTER * (skin[vert_body[i]] - most)
@@ -89,15 +94,22 @@ def find_motion(
 def find_fastest(
     # in
     edge: wp.array[float],  # (n_body,) shortest of the world [m]
-    motion: wp.array[float],  # (n_body,) [m]
+    motion: wp.array[float],  # (n_body,) [m] predicted
+    recent: wp.array[float],  # (n_body,) [m] largest of the last motions
+    drift: wp.array[float],  # (n_body,) [m] since the pairs were found
+    age: wp.array[int],  # (1,) steps since then
+    # out
+    rate: wp.array[float],  # (n_body,) [m] motion in a step
     # out, added to
     fastest: wp.array[float],  # (1,) [m]
-    total: wp.array[int],  # (1,) sum of the motions, none above an edge, in edges / MOTION_UNIT
+    total: wp.array[int],  # (1,) sum of the rates, none above an edge, in edges / MOTION_UNIT
 ):
-    """One thread per body: the motion of the fastest, and the sum of all motions."""
+    """One thread per body: its rate; the motion of the fastest, and the sum of all rates."""
     m = wp.tid()
+    mean = drift[m] / float(wp.max(age[0], 1))
+    rate[m] = wp.min(motion[m], wp.max(recent[m], mean))
     wp.atomic_max(fastest, 0, motion[m])
-    wp.atomic_add(total, 0, int(MOTION_UNIT * wp.min(motion[m] / edge[m], 1.0)))
+    wp.atomic_add(total, 0, int(MOTION_UNIT * wp.min(rate[m] / edge[m], 1.0)))
 
 
 @wp.func
@@ -117,30 +129,31 @@ def widest_skins(
     # in
     edge: wp.array[float],  # (n_body,) shortest of the world [m]
     fastest: wp.array[float],  # (1,) [m]
-    motion: wp.array[float],  # (n_body,) [m]
+    motion: wp.array[float],  # (n_body,) [m] predicted
+    rate: wp.array[float],  # (n_body,) [m]
     # out
     skin: wp.array[float],  # (n_body,) [m]
 ):
     """One thread per body: the widest skin that it may get."""
     m = wp.tid()
-    own = of_motion(motion[m], edge[m], LONGEST) + of_motion(motion[m], edge[m], 1.0)
-    skin[m] = own + fastest[0]
+    own = of_motion(rate[m], edge[m], LONGEST) + of_motion(motion[m], edge[m], 1.0)
+    skin[m] = own + motion[m] - rate[m] + fastest[0]
 
 
 @wp.func
-def spare(m: int, looks: float, edge: float, motion: wp.array[float]) -> wp.vec3:
+def spare(m: int, looks: float, edge: float, rate: wp.array[float]) -> wp.vec3:
     """By how much a skin for so many steps is narrower than the widest one [m]."""
-    d = of_motion(motion[m], edge, LONGEST) - of_motion(motion[m], edge, looks)
+    d = of_motion(rate[m], edge, LONGEST) - of_motion(rate[m], edge, looks)
     return wp.vec3(d, d, d)
 
 
 @wp.func
 def meet_within(
-    m: int, other: int, looks: float, edge: wp.array[float], motion: wp.array[float], of: Near
+    m: int, other: int, looks: float, edge: wp.array[float], rate: wp.array[float], of: Near
 ) -> bool:
     """Whether the boxes of two bodies meet with skins for so many steps."""
-    a = spare(m, looks, edge[m], motion)
-    b = spare(other, looks, edge[other], motion)
+    a = spare(m, looks, edge[m], rate)
+    b = spare(other, looks, edge[other], rate)
     return boxes_meet(of.lower[m] + a, of.upper[m] - a, of.lower[other] + b, of.upper[other] - b)
 
 
@@ -148,14 +161,16 @@ def meet_within(
 def choose_skins(
     # in
     edge: wp.array[float],  # (n_body,) shortest of the world [m]
-    total: wp.array[int],  # (1,) sum of the motions
-    motion: wp.array[float],  # (n_body,) [m]
+    total: wp.array[int],  # (1,) sum of the rates
+    motion: wp.array[float],  # (n_body,) [m] predicted
+    rate: wp.array[float],  # (n_body,) [m]
     of: Near,  # with the widest skins
     # out
     free: wp.array[float],  # (n_body,) [m]
     skin: wp.array[float],  # (n_body,) [m]
     stale: wp.array[int],  # (1,) 0
     any_pair: wp.array[int],  # (1,) 0
+    age: wp.array[int],  # (1,) 0
 ):
     """One thread per body: its skin, and the part of it that is free."""
     m = wp.tid()
@@ -165,20 +180,21 @@ def choose_skins(
     if of.n_near[m] <= MANY:
         for k in range(of.n_near[m]):
             other = of.other[m, k]
-            if meet_within(m, other, looks, edge, motion, of):
+            if meet_within(m, other, looks, edge, rate, of):
                 push = wp.max(push, motion[other])
     else:
         root = wp.bvh_get_group_root(of.bodies, of.world[m])
         query = wp.bvh_query_aabb(of.bodies, of.lower[m], of.upper[m], root)
         while wp.bvh_query_next(query, other):
-            if other != m and meet_within(m, other, looks, edge, motion, of):
+            if other != m and meet_within(m, other, looks, edge, rate, of):
                 push = wp.max(push, motion[other])
     if of.n_near[m] == 0:
         looks = LONGEST
-    free[m] = of_motion(motion[m], edge[m], looks) + 0.5 * push
+    free[m] = of_motion(rate[m], edge[m], looks) + motion[m] - rate[m] + 0.5 * push
     skin[m] = free[m] + of_motion(motion[m], edge[m], 1.0) + 0.5 * push
     stale[0] = 0
     any_pair[0] = 0
+    age[0] = 0
 
 
 @wp.kernel

@@ -63,8 +63,11 @@ class BroadPhase:
         x: positions at which the pairs were found [m], shape (n_vert,)
         free: how far from ``x`` a prediction may be [m], shape (n_body,)
         skin: how far from ``x`` the pairs hold [m], shape (n_body,)
-        fastest: largest of the motions when the pairs were found [m], shape (1,)
-        total: their sum, in counts of skins.py, shape (1,)
+        age: steps since the pairs were found, shape (1,)
+        drift: largest motion of each body since the pairs before were found [m], shape (n_body,)
+        rate: motion of each body in a step, when they were found [m], shape (n_body,)
+        fastest: largest of the predicted motions then [m], shape (1,)
+        total: sum of the rates, in counts of skins.py, shape (1,)
         stale: whether the pairs have to be found again, shape (1,)
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
@@ -85,6 +88,9 @@ class BroadPhase:
     x: wp.array[wp.vec3]
     free: wp.array[float]
     skin: wp.array[float]
+    age: wp.array[int]
+    drift: wp.array[float]
+    rate: wp.array[float]
     fastest: wp.array[float]
     total: wp.array[int]
     stale: wp.array[int]
@@ -115,6 +121,9 @@ def allocate(model: Model, x: wp.array[wp.vec3], capacity: Capacity) -> BroadPha
         x=wp.zeros(n, dtype=wp.vec3),
         free=wp.zeros(n_body, dtype=float),
         skin=wp.zeros(n_body, dtype=float),
+        age=wp.zeros(1, dtype=int),
+        drift=wp.zeros(n_body, dtype=float),
+        rate=wp.zeros(n_body, dtype=float),
         fastest=wp.zeros(1, dtype=float),
         total=wp.zeros(1, dtype=int),
         stale=wp.full(1, 1, dtype=int),

@@ -27,21 +27,22 @@ def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
         skins.moved,
         dim=model.n_vert,
         inputs=[model.vert_body, b.free, b.skin, b.x, x0, x1],
-        outputs=[b.stale],
+        outputs=[b.stale, b.age],
     )
     if_any(b.stale, _find, model, x0, x1, work)
 
 
 def track(model: Model, x: wp.array, travel: Travel, work: Work) -> None:
     """Begin a detection pass at ``x``: add the distances travelled; no contact is new yet."""
-    _move(model, x, travel)
+    _move(model, x, travel.last, travel.motion)
     outputs = [travel.motion, travel.recent, travel.travelled, work.narrow_phase.new]
     wp.launch(skins.add_motion, dim=model.n_body, inputs=[], outputs=outputs)
 
 
 def _find(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     b = work.broad_phase
-    wp.copy(b.x, x0)
+    b.drift.zero_()
+    _move(model, x0, b.x, b.drift)
     for pairs in (b.verts, b.edges):
         wp.copy(pairs.travel.last, x0)
         pairs.travel.motion.zero_()
@@ -69,11 +70,11 @@ def _list_none(work: Work) -> None:
         pairs.item_start.zero_()
 
 
-def _move(model: Model, x: wp.array, travel: Travel) -> None:
-    """Update ``motion`` by the motion up to ``x``."""
+def _move(model: Model, x: wp.array, last: wp.array, motion: wp.array) -> None:
+    """Update ``motion`` of each body by that from ``last`` to ``x``, which is ``last`` from now on."""
     chunks = -(-model.n_vert // int(skins.CHUNK))
     inputs = [model.vert_body, x]
-    wp.launch(skins.find_motion, dim=chunks, inputs=inputs, outputs=[travel.last, travel.motion])
+    wp.launch(skins.find_motion, dim=chunks, inputs=inputs, outputs=[last, motion])
 
 
 def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
@@ -81,22 +82,22 @@ def _choose_skins(model: Model, x1: wp.array, work: Work) -> None:
     b, edge = work.broad_phase, work.mesh.shortest_edge
     motion = b.verts.travel.motion
     b.fastest.zero_()
-    _move(model, x1, b.verts.travel)
+    _move(model, x1, b.verts.travel.last, motion)
     b.total.zero_()
     wp.launch(
         skins.find_fastest,
         dim=model.n_body,
-        inputs=[edge, motion],
-        outputs=[b.fastest, b.total],
+        inputs=[edge, motion, b.edges.travel.recent, b.drift, b.age],
+        outputs=[b.rate, b.fastest, b.total],
     )
-    inputs = [edge, b.fastest, motion]
+    inputs = [edge, b.fastest, motion, b.rate]
     wp.launch(skins.widest_skins, dim=model.n_body, inputs=inputs, outputs=[b.skin])
     _find_near(model, work)
     wp.launch(
         skins.choose_skins,
         dim=model.n_body,
-        inputs=[edge, b.total, motion, b.near],
-        outputs=[b.free, b.skin, b.stale, b.any_pair],
+        inputs=[edge, b.total, motion, b.rate, b.near],
+        outputs=[b.free, b.skin, b.stale, b.any_pair, b.age],
     )
     _find_near(model, work)
 

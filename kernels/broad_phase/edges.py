@@ -8,11 +8,13 @@ import warp as wp
 from warp_contact.kernels.broad_phase.bounds import next_in
 from warp_contact.kernels.broad_phase.near import MANY, Near, is_near, piece, reaches
 from warp_contact.kernels.broad_phase.pairs import append
-from warp_contact.kernels.geometry import boxes_meet
+from warp_contact.kernels.geometry import NONE, boxes_meet
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
+
+AXES = wp.constant(8)  # of a segment and a triangle: its normal, and products of directions
 
 
 @wp.func
@@ -33,32 +35,55 @@ def gap_along(
 
 
 @wp.func
+def axis_of(k: int, d: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
+    """Axis k of a segment along d and the triangle 0bc: one of AXES that may separate them."""
+    n = wp.cross(b, c)
+    if k == 0:
+        return n
+    if k == 1:
+        return wp.cross(n, d)
+    e = b
+    if k >= 4:
+        e = c
+    if k >= 6:
+        e = c - b
+    if k % 2 == 0:
+        return wp.cross(d, e)
+    return wp.cross(n, e)
+
+
+@wp.struct
+class Separation:
+    axis: int  # of AXES
+    gap: float  # [m] along it, not above 0 where they may cross
+
+
+@wp.func
+def separation(
+    p: wp.vec3, q: wp.vec3, t: wp.vec3i, enough: float, x: wp.array[wp.vec3]
+) -> Separation:
+    """The axis with the largest gap between pq and triangle t, or the first beyond ``enough``."""
+    a = x[t[0]]
+    b = x[t[1]] - a
+    c = x[t[2]] - a
+    out = Separation()
+    out.gap = -NONE
+    for k in range(AXES):
+        if out.gap <= enough:
+            gap = gap_along(axis_of(k, q - p, b, c), p - a, q - a, b, c)
+            if gap > out.gap:
+                out.gap = gap
+                out.axis = k
+    return out
+
+
+@wp.func
 def gap_to(p: wp.vec3, q: wp.vec3, t: wp.vec3i, enough: float, x: wp.array[wp.vec3]) -> float:
     """Lower bound [m] on the distance of pq to triangle t, by the separating axis theorem.
 
     The gap along the first axis where it exceeds ``enough``, else the largest gap of all axes.
     """
-    a = x[t[0]]
-    u = p - a
-    v = q - a
-    b = x[t[1]] - a
-    c = x[t[2]] - a
-    d = q - p
-    n = wp.cross(b, c)
-    gap = gap_along(n, u, v, b, c)
-    if gap <= enough:
-        gap = wp.max(gap, gap_along(wp.cross(n, d), u, v, b, c))
-    e = b
-    for k in range(3):
-        if k == 1:
-            e = c
-        if k == 2:
-            e = c - b
-        if gap <= enough:
-            gap = wp.max(gap, gap_along(wp.cross(d, e), u, v, b, c))
-        if gap <= enough:
-            gap = wp.max(gap, gap_along(wp.cross(n, e), u, v, b, c))
-    return gap
+    return separation(p, q, t, enough, x).gap
 
 
 @wp.kernel

@@ -5,11 +5,11 @@ Edges are tested at the positions to which the impulses on the vertices lead.
 
 import warp as wp
 
-from warp_contact.kernels.broad_phase.edges import gap_to
 from warp_contact.kernels.broad_phase.pairs import PairList
 from warp_contact.kernels.broad_phase.skins import CAREFUL
-from warp_contact.kernels.geometry import NONE, projected_crossing, projected_weights
+from warp_contact.kernels.geometry import projected_crossing, projected_weights
 from warp_contact.kernels.mesh import Mesh
+from warp_contact.kernels.narrow_phase.apart import Apart, pair_clearance
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact, edge_contact, is_same
 from warp_contact.kernels.narrow_phase.vertex_contact import SLIP
@@ -19,26 +19,6 @@ from warp_contact.kernels.worlds import Worlds
 wp.set_module_options(OPTIONS)
 
 AHEAD = wp.constant(16.0)  # detection passes: a larger clearance need not be known exactly
-
-
-@wp.func
-def clearance(
-    among: wp.vec2i,
-    enough: float,  # [m]
-    tri: wp.array[int],
-    tris: wp.array[wp.vec3i],
-    x: wp.array[wp.vec3],
-    p: wp.vec3,
-    q: wp.vec3,
-) -> float:
-    """Lower bound [m] on the distance of pq to all triangles; 0 where it may cross one."""
-    out = float(NONE)
-    for k in range(among[0], among[1]):
-        gap = gap_to(p, q, tris[tri[k]], enough, x)
-        if not gap > 0.0:
-            return 0.0
-        out = wp.min(out, gap)
-    return out
 
 
 @wp.func
@@ -66,6 +46,7 @@ def find_crossings(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
     clear_until: wp.array[float],  # (capacity,) [m] travelled by both, before any crossing
+    separated: Apart,  # by what, in the last pass that looked at the pair
     place: wp.array[int],  # (capacity,) of its first contact in ``contact``, -1 for none
     contact: wp.array[EdgeContact],  # (contacts,) in any order
     # out
@@ -98,7 +79,9 @@ def find_crossings(
             continue
         among = pairs.items[c]
         enough = wp.min(AHEAD * (recent[own] + recent[body]), reach)
-        clear = clearance(among, enough, pairs.item, mesh.tris, x, x[e[0]], x[e[1]])
+        clear = pair_clearance(
+            c, among, enough, pairs.item, mesh.tris, x, x[e[0]], x[e[1]], separated
+        )
         clear_until[c] = spent + CAREFUL * clear
         if clear > 0.0:
             continue

@@ -9,6 +9,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.overflow import Capacity
 from warp_contact.kernels.broad_phase.near import MANY, Near, NearPart
 from warp_contact.kernels.broad_phase.pairs import PairList
+from warp_contact.kernels.narrow_phase.apart import Apart
 
 LEAF = 8  # triangles in a leaf: a query for the few near a vertex takes a quarter less than with 1
 
@@ -71,6 +72,7 @@ class BroadPhase:
         stale: whether the pairs have to be found again, shape (1,)
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
+        apart: what separates them, until they are found again
         any_pair: whether there are any, shape (1,)
         n_found: length of the list that is being filled, shape (1,)
         vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
@@ -96,6 +98,7 @@ class BroadPhase:
     stale: wp.array[int]
     verts: Pairs
     edges: Pairs
+    apart: Apart
     any_pair: wp.array[int]
     n_found: wp.array[int]
     vert_tet: wp.array[wp.vec2i]
@@ -129,6 +132,7 @@ def allocate(model: Model, x: wp.array[wp.vec3], capacity: Capacity) -> BroadPha
         stale=wp.full(1, 1, dtype=int),
         verts=_pairs(model, n, capacity.verts, capacity.tets),
         edges=_pairs(model, model.n_edge, capacity.edges, capacity.tris),
+        apart=_apart(capacity),
         any_pair=wp.zeros(1, dtype=int),
         n_found=wp.zeros(1, dtype=int),
         vert_tet=wp.zeros(capacity.tets, dtype=wp.vec2i),
@@ -195,3 +199,10 @@ def _pairs(model: Model, n_owner: int, n_pair: int, n_item: int) -> Pairs:
             travelled=wp.zeros(model.n_body + model.n_plane, dtype=float),
         ),
     )
+
+
+def _apart(capacity: Capacity) -> Apart:
+    apart = Apart()
+    apart.gap = wp.zeros(capacity.edges, dtype=float)
+    apart.axis = wp.zeros(capacity.tris, dtype=int)
+    return apart

@@ -118,7 +118,7 @@ def _find_edges(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool
             work.capacity.edges,
             inputs=[apart, work.mesh, b.edges.list, b.skin, travel.recent, travel.travelled]
             + [x0, x],
-            outputs=[b.edges.clear_until, n.place, n.found, n.crossing_at]
+            outputs=[b.edges.clear_until, b.apart, n.place, n.found, n.crossing_at]
             + [n.n_place, n.n_new, work.worlds],
         )
         scan(n.crossing_at, work.scan, inclusive=False)

@@ -20,6 +20,7 @@ are terms through a face that no face of the vertex opposes (opposing.py).
 import warp as wp
 
 from warp_contact.kernels.mesh import Mesh
+from warp_contact.kernels.narrow_phase.beside import Beside, list_beside
 from warp_contact.kernels.narrow_phase.opposing import looks_against
 from warp_contact.kernels.narrow_phase.shallow import ABOVE, BELOW, place_of, shallow_depth
 from warp_contact.kernels.narrow_phase.surface_query import corner_normals, first_hit, hit_point
@@ -83,7 +84,9 @@ def border_depth(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     pair_start: wp.array[int],  # (n_vert + 1,) first pair of each vertex
     inside_at: wp.array[int],  # (n_pair + 1,) penetrations before each pair
+    travelled: wp.array[float],  # (n_body + n_plane,) [m]
     # in, out
+    beside: Beside,
     penetration: wp.array[Penetration],  # (capacity,) layer 0 at the border
     # out, added to
     pending: wp.array[int],  # (1,) 1 when some penetration has no depth yet
@@ -96,7 +99,9 @@ def border_depth(
             continue
         reach = shallow * mesh.body_edge[found.body]
         root = wp.bvh_get_group_root(mesh.bvh, found.body)
-        at = place_of(found.vert, root, reach, mesh, x)
+        spent = travelled[mesh.vert_body[found.vert]] + travelled[found.body]
+        list_beside(found.pair, x[found.vert], root, reach, spent, mesh, x, beside)
+        at = place_of(found, root, reach, mesh, x, beside)
         if at.side == BELOW:
             found = shallow_depth(found, at, reach, mesh, x, pair_start, inside_at, penetration)
         if at.side == ABOVE:

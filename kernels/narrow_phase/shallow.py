@@ -22,6 +22,7 @@ cross nothing, and it has no depth.
 import warp as wp
 
 from warp_contact.kernels.mesh import Mesh
+from warp_contact.kernels.narrow_phase.beside import MOST, Beside, few_tris
 from warp_contact.kernels.narrow_phase.opposing import looks_against
 from warp_contact.kernels.narrow_phase.surface_query import (
     CREASE,
@@ -37,7 +38,6 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-MOST = wp.constant(8)  # triangles within reach
 SAME = wp.constant(0.02)  # weight of edges that may lead out elsewhere
 STRAIGHT = wp.constant(0.99)  # cosine: a closest point further aside is at a rim
 
@@ -46,58 +46,80 @@ UNSURE = wp.constant(0)
 ABOVE = wp.constant(1)
 BELOW = wp.constant(2)
 
-near_tris = wp.types.vector(length=8, dtype=wp.int32)
-
-
 @wp.struct
 class Place:
     """Where a vertex lies against the triangles within reach."""
 
     side: int
     hit: Hit  # the closest point of those that the vertex opposes
+    n: wp.vec3  # normal there
     n_near: int
-    near: near_tris
+    near: few_tris
+    above: bool  # in front of all
+    smooth: bool  # all that the vertex opposes look about the same way
 
 
 @wp.func
-def place_of(
+def with_near(
+    place: Place,
+    k: int,
     i: int,
-    root: int,
     reach: float,  # [m]
     mesh: Mesh,
     x: wp.array[wp.vec3],
 ) -> Place:
-    """Where vertex i lies; BELOW if all triangles that it opposes look about the same way."""
-    out = Place()
-    out.hit.tri = -1
-    out.hit.t = reach
+    """The place of vertex i, with triangle k included if it is within reach."""
+    out = place
     within = Hit()
     within.tri = -1
     within.t = reach
     p = x[i]
-    above = bool(True)
-    smooth = bool(True)
-    n = wp.vec3(0.0, 0.0, 0.0)  # of the closest
-    k = int(0)
-    grow = wp.vec3(reach, reach, reach)
-    query = wp.bvh_query_aabb(mesh.bvh, p - grow, p + grow, root)
-    while wp.bvh_query_next(query, k):
-        at = closer(within, k, mesh.tris, x, p)
-        if at.tri >= 0:
-            if out.n_near < MOST:
-                out.near[out.n_near] = k
-            out.n_near += 1
-            own = face_normal(mesh.tris[k], x)
-            above = above and wp.dot(hit_point(at, mesh.tris, x) - p, own) <= 0.0
-            if looks_against(i, own, mesh.tris, mesh.vs_start, mesh.vs_tri, x):
-                smooth = smooth and (out.hit.tri < 0 or wp.dot(own, n) > CREASE)
-                if at.t < out.hit.t or (at.t == out.hit.t and k < out.hit.tri):
-                    out.hit = at
-                    n = own
-    if out.n_near > 0 and above:
+    at = closer(within, k, mesh.tris, x, p)
+    if at.tri < 0:
+        return out
+    if out.n_near < MOST:
+        out.near[out.n_near] = k
+    out.n_near += 1
+    own = face_normal(mesh.tris[k], x)
+    out.above = out.above and wp.dot(hit_point(at, mesh.tris, x) - p, own) <= 0.0
+    if looks_against(i, own, mesh.tris, mesh.vs_start, mesh.vs_tri, x):
+        out.smooth = out.smooth and (out.hit.tri < 0 or wp.dot(own, out.n) > CREASE)
+        if at.t < out.hit.t or (at.t == out.hit.t and k < out.hit.tri):
+            out.hit = at
+            out.n = own
+    return out
+
+
+@wp.func
+def place_of(
+    e: Penetration,
+    root: int,
+    reach: float,  # [m]
+    mesh: Mesh,
+    x: wp.array[wp.vec3],
+    beside: Beside,
+) -> Place:
+    """Where a vertex lies; BELOW if all triangles that it opposes look about the same way."""
+    out = Place()
+    out.hit.tri = -1
+    out.hit.t = reach
+    out.above = True
+    out.smooth = True
+    p = x[e.vert]
+    n = beside.n[e.pair]
+    if n <= MOST:
+        for m in range(n):
+            out = with_near(out, beside.tri[e.pair][m], e.vert, reach, mesh, x)
+    else:
+        k = int(0)
+        grow = wp.vec3(reach, reach, reach)
+        query = wp.bvh_query_aabb(mesh.bvh, p - grow, p + grow, root)
+        while wp.bvh_query_next(query, k):
+            out = with_near(out, k, e.vert, reach, mesh, x)
+    if out.n_near > 0 and out.above:
         out.side = ABOVE
-    elif out.hit.tri >= 0 and smooth and out.n_near <= MOST:
-        if wp.dot(hit_point(out.hit, mesh.tris, x) - p, n) > STRAIGHT * out.hit.t:
+    elif out.hit.tri >= 0 and out.smooth and out.n_near <= MOST:
+        if wp.dot(hit_point(out.hit, mesh.tris, x) - p, out.n) > STRAIGHT * out.hit.t:
             out.side = BELOW
     return out
 

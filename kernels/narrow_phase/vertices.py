@@ -81,6 +81,7 @@ class Penetration:
 
     vert: int
     body: int  # n_body + p for plane p
+    pair: int  # of the broad phase
     layer: int  # of the propagation, -1: no depth yet
     depth: float  # [m]
     direction: wp.vec3  # out of the body
@@ -151,6 +152,7 @@ def list_penetrations(
         found = Penetration()
         found.vert = pairs.pair[c][0]
         found.body = pairs.pair[c][1]
+        found.pair = c
         found.layer = wp.where(found.body >= n_body, 0, -1)
         found.hit.tri = -1
         penetration[e] = found

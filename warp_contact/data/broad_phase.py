@@ -10,6 +10,7 @@ from warp_contact.data.overflow import Capacity
 from warp_contact.kernels.broad_phase.near import MANY, Near, NearPart
 from warp_contact.kernels.broad_phase.pairs import PairList
 from warp_contact.kernels.narrow_phase.apart import Apart
+from warp_contact.kernels.narrow_phase.beside import Beside, few_tris
 
 LEAF = 8  # triangles in a leaf: a query for the few near a vertex takes a quarter less than with 1
 
@@ -72,7 +73,8 @@ class BroadPhase:
         stale: whether the pairs have to be found again, shape (1,)
         verts: vertices and bodies with tets; a plane is a body with one tet
         edges: surface edges and bodies with triangles
-        apart: what separates them, until they are found again
+        apart: what separates the latter, until they are found again
+        beside: triangles beside the former, as long
         any_pair: whether there are any, shape (1,)
         n_found: length of the list that is being filled, shape (1,)
         vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
@@ -99,6 +101,7 @@ class BroadPhase:
     verts: Pairs
     edges: Pairs
     apart: Apart
+    beside: Beside
     any_pair: wp.array[int]
     n_found: wp.array[int]
     vert_tet: wp.array[wp.vec2i]
@@ -133,6 +136,7 @@ def allocate(model: Model, x: wp.array[wp.vec3], capacity: Capacity) -> BroadPha
         verts=_pairs(model, n, capacity.verts, capacity.tets),
         edges=_pairs(model, model.n_edge, capacity.edges, capacity.tris),
         apart=_apart(capacity),
+        beside=_beside(capacity),
         any_pair=wp.zeros(1, dtype=int),
         n_found=wp.zeros(1, dtype=int),
         vert_tet=wp.zeros(capacity.tets, dtype=wp.vec2i),
@@ -206,3 +210,11 @@ def _apart(capacity: Capacity) -> Apart:
     apart.gap = wp.zeros(capacity.edges, dtype=float)
     apart.axis = wp.zeros(capacity.tris, dtype=int)
     return apart
+
+
+def _beside(capacity: Capacity) -> Beside:
+    beside = Beside()
+    beside.until = wp.zeros(capacity.verts, dtype=float)
+    beside.n = wp.zeros(capacity.verts, dtype=int)
+    beside.tri = wp.zeros(capacity.verts, dtype=few_tris)
+    return beside

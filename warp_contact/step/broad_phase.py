@@ -49,6 +49,7 @@ def _find(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
         pairs.travel.travelled.zero_()
         pairs.clear_until.fill_(-1.0)
     b.apart.gap.zero_()
+    b.beside.until.fill_(-1.0)
     _choose_skins(model, x1, work)
     if model.n_plane:
         _list_pairs(model, work)

@@ -12,12 +12,12 @@ from warp_contact.kernels.narrow_phase import depth as kernels
 
 def find_depths(model: Model, x: wp.array, work: Work) -> None:
     """Set depth, direction and layer of the penetrations at ``x``; call once for each list."""
-    n = work.narrow_phase
+    n, b = work.narrow_phase, work.broad_phase
     launch_over(
         kernels.border_depth,
         work.capacity.contacts,
-        inputs=[SHALLOW, work.mesh, x, work.broad_phase.verts.list.start, n.inside_at],
-        outputs=[n.penetration, n.pending],
+        inputs=[SHALLOW, work.mesh, x, b.verts.list.start, n.inside_at, b.verts.travel.travelled],
+        outputs=[b.beside, n.penetration, n.pending],
     )
     if on("layers"):
         while_any(n.pending, _fill_layer, x, work)

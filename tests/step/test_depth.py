@@ -8,6 +8,7 @@ import warp as wp
 
 from warp_contact import NeoHookean, Scene, TetMesh, box, sphere
 from warp_contact.scene.scene import rotation_matrix
+from warp_contact.kernels.narrow_phase import shallow
 from warp_contact.step import depth, narrow_phase
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -263,3 +264,36 @@ def test_depths_are_those_of_the_published_formulas(
             assert found[i, body][1] == pytest.approx(d, abs=1e-4)
             np.testing.assert_allclose(found[i, body][2], r, atol=2e-3)
     assert n > 20
+
+
+def test_depths_next_to_a_smooth_surface_are_those_of_the_published_formulas(
+    rng, stages, find_contacts, turned
+):
+    """To the order of the depth: the edges need not be followed there."""
+    turn, shift = rotation_matrix(turned()), rng.uniform(-1.0, 1.0, 3)
+    scene = Scene()
+    mesh = box(1.0, 6)
+    inner = np.tile(np.abs(mesh.vertices[:, :2]).max(axis=1) < 0.4, 2)  # at no rim
+    for k in (0, 1):
+        x = mesh.vertices + rng.uniform(-0.02, 0.02, mesh.vertices.shape) * [1.0, 1.0, 0.0]
+        x[:, 2] += 0.998 * k
+        x[:, 2] += 0.01 * np.sin(4.0 * x[:, 0]) + 0.01 * np.cos(3.0 * x[:, 1])
+        scene.add_body(TetMesh(x @ turn.T + shift, mesh.tets), RUBBER)
+    model, state, work = stages(scene)
+    find_contacts(model, work, state.x)
+    records = work.narrow_phase.penetration.numpy()[: work.contacts.n_vertex.numpy()[0]]
+    edge = model.body_edge.numpy()
+    x = state.x.numpy().astype(float)
+    n = 0
+    for body in (0, 1):
+        of_body = records[records["body"] == body]
+        reference = Reference(model, x, set(of_body["vert"].tolist()), body)
+        of_body = of_body[inner[of_body["vert"]]]
+        for at in of_body[of_body["side"] == shallow.BELOW]:
+            n += 1
+            d, r = reference.border(int(at["vert"]))
+            assert at["depth"] == pytest.approx(d, abs=0.02 * d + 1e-4 * edge[body])
+            np.testing.assert_allclose(at["direction"], r, atol=0.02)
+        for at in of_body[of_body["side"] == shallow.ABOVE]:
+            assert not reference.border(int(at["vert"]))
+    assert n > 30

@@ -62,8 +62,7 @@ class Spectrum:
         self._basis = wp.zeros((DEPTH + 1, model.n_vert), dtype=wp.vec3)
         self._f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
         self._x = wp.empty(model.n_vert, dtype=wp.vec3)
-        noise = np.random.default_rng(SEED).standard_normal((model.n_vert, 3))
-        self._noise = wp.array(_unit(noise, model), dtype=wp.vec3)
+        self._noise = wp.array(_noise(model, self._worlds), dtype=wp.vec3)
         self._start: dict[Callable, wp.array] = {}
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
         self._before = wp.zeros(model.n_tet, dtype=wp.mat33)
@@ -278,8 +277,12 @@ def _chunks(body_vert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.append(first, body_vert[-1]), body_chunk
 
 
-def _unit(u: np.ndarray, model: Model) -> np.ndarray:
-    """Give the part of ``u`` on the free vertices of each body the mass norm 1."""
+def _noise(model: Model, worlds: Worlds) -> np.ndarray:
+    """Random vectors of mass norm 1 for each body, whatever other worlds there are: (n_vert, 3)."""
+    u = np.empty((model.n_vert, 3))
+    ends = np.cumsum(np.bincount(worlds.of_vert))
+    for own in np.split(np.argsort(worlds.of_vert, kind="stable"), ends[:-1]):
+        u[own] = np.random.default_rng(SEED).standard_normal((len(own), 3))
     u = np.where(model.inv_mass.numpy()[:, None] > 0.0, u, 0.0)
     body = model.vert_body.numpy()
     norm2 = np.bincount(body, model.mass.numpy() * (u * u).sum(axis=1), minlength=model.n_body)

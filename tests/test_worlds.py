@@ -14,7 +14,7 @@ from warp_contact import NeoHookean, Scene, Simulation, box, sphere
 RUBBER = NeoHookean(5e4, 0.35, 1000.0, 2e-3)
 EDGE = 0.05
 FRAMES = 40
-OBSERVED = ("stack", "undamped stack", "hit", "edges")
+OBSERVED = ("stack", "undamped stack", "hit", "edges", "inside")
 
 
 def soft(scene: Scene) -> None:
@@ -43,6 +43,12 @@ def pile(scene: Scene) -> None:
         scene.add_body(sphere(0.05, 41), RUBBER, place, world=1)
 
 
+def inside(scene: Scene, world: int = 1) -> None:
+    """Blocks begin in each other, and are led apart."""
+    for k in range(3):
+        scene.add_body(box(0.1, 2), RUBBER, (0.01 * k, 0.02, 0.0502 + 0.07 * k), world=world)
+
+
 def crossing(scene: Scene, world: int = 1) -> None:
     """Edges fall on edges: new contacts of them are found in many steps."""
     for k in range(3):
@@ -63,8 +69,8 @@ class Bodies(list):
 def bodies_of(observed: str) -> Bodies:
     """The observed world."""
     ours = Bodies()
-    if observed == "edges":
-        crossing(ours, world=0)
+    if observed in ("edges", "inside"):
+        {"edges": crossing, "inside": inside}[observed](ours, world=0)
     elif observed == "hit":
         ours.add_body(box(0.1, 2), RUBBER, (0.0, 0.0, 0.0502))
         velocity = (-2.0, 0.0, 0.0)
@@ -117,7 +123,7 @@ def same_bits(observed: str, ours: np.ndarray, **settings) -> None:
     np.testing.assert_array_equal(ours[1], theirs[1])
 
 
-@pytest.mark.parametrize("neighbour", [soft, stiff, fast, fine, pile, crossing])
+@pytest.mark.parametrize("neighbour", [soft, stiff, fast, fine, pile, crossing, inside])
 @pytest.mark.parametrize("observed", OBSERVED)
 def test_a_world_moves_as_if_it_were_alone(observed, neighbour):
     same_bits(observed, motion(observed, [neighbour]))
@@ -142,3 +148,19 @@ def test_a_neighbour_may_take_more_steps_or_fewer():
     for sim in (few, many):
         sim.step_frame()
     assert many.substeps > few.substeps
+
+
+@pytest.mark.parametrize("observed", OBSERVED)
+def test_nor_does_one_that_is_put_into_itself_on_the_way(observed):
+    """The bodies of a neighbour are put into each other, then where they began."""
+    scene, ours = of_worlds(observed, [soft, inside])
+    sim, alone = Simulation(scene), Simulation(of_worlds(observed)[0])
+    (one, other, *_) = (body.index for body in scene.bodies if body.world == 1)
+    for frame in range(20):
+        if frame == 5:
+            sim.set_positions(one, sim.positions(other)[:] + np.float32([0.0, 0.0, 0.03]))
+        if frame == 12:
+            sim.reset([1])
+        sim.step_frame(), alone.step_frame()
+        np.testing.assert_array_equal(seen(sim.positions, ours), alone.positions())
+        np.testing.assert_array_equal(seen(sim.velocities, ours), alone.velocities())

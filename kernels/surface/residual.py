@@ -19,10 +19,9 @@ wp.set_module_options(OPTIONS)
 STRAY = wp.constant(1.0e-3)  # barycentric weight below which a vertex has left its triangle
 
 # Places in ``found``.
-WAS_OLD = wp.constant(0)  # some overlap was for the search, since the frame began
-OPEN = wp.constant(1)  # some overlap is to be closed
-OLD = wp.constant(2)  # some overlap is for the search: it is older than the step
-WORLDS = wp.constant(3)  # from here on, for each world: ``open`` of worlds.py
+OPEN = wp.constant(0)  # some overlap is to be closed
+OLD = wp.constant(1)  # some overlap is for the search: it is older than the step
+WORLDS = wp.constant(2)  # from here on, for each world: ``open``, ``old``, ``was_old`` of worlds.py
 
 
 @wp.kernel
@@ -38,8 +37,8 @@ def residual_gaps(
     # out
     residual: wp.array[float],  # (capacity,) [m], 0 up to the tolerance
     # out, added to
-    worlds: Worlds,  # those with an overlap to be closed
-    found: wp.array[int],  # (3 + n_world,) 1 where it is true
+    worlds: Worlds,  # those with an overlap to be closed, or for the search
+    found: wp.array[int],  # (2 + 3 n_world,) 1 where it is true
 ):
     """For each contact: its overlap at x."""
     for c in range(wp.tid(), n_contact[0], threads):
@@ -49,16 +48,18 @@ def residual_gaps(
             continue
         d = -gap(at, x)
         edge = at.edge_length
+        world = worlds.of_vert[at.vert[0]]
         if d > CLOSURE_TOLERANCE * edge:
             residual[c] = d
-            world = worlds.of_vert[at.vert[0]]
             if worlds.open[world] >= look - 1:
                 worlds.open[world] = look
                 found[OPEN] = 1
         old = -constraint[c].gap_bound * dt[at.vert[0]]
         if d > OLD_OVERLAP * edge and old > OLD_OVERLAP * edge:
-            found[OLD] = 1
-            found[WAS_OLD] = 1
+            if worlds.apart[world] == 0 and worlds.open[world] >= look - 1:
+                worlds.old[world] = 1
+                worlds.was_old[world] = 1
+                found[OLD] = 1
 
 
 @wp.kernel
@@ -70,14 +71,20 @@ def find_strays(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out, added to
     worlds: Worlds,  # those with an overlap to be closed
-    found: wp.array[int],  # (3 + n_world,) 1 for an overlap
+    found: wp.array[int],  # (2 + 3 n_world,) 1 for an overlap
 ):
-    """For each contact of a vertex with a triangle: whether the vertex left it, or lies below."""
+    """For each contact of a vertex with a triangle: whether the vertex left it, or lies below.
+
+    Not where bodies may have overlapped when the step began.
+    """
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
         if at.coef[0] != 1.0 or at.on_plane:
             continue
         if wp.length_sq(at.normal) == 0.0:
+            continue
+        world = worlds.of_vert[at.vert[0]]
+        if worlds.apart[world] == 0:
             continue
         p = x[at.vert[0]]
         t0 = x[at.vert[2]]
@@ -87,5 +94,5 @@ def find_strays(
         w = projected_weights(p, at.normal, t0, t1, t2)
         below = wp.dot(p - t0, face) < -CLOSURE_TOLERANCE * at.edge_length
         if wp.min(w) < -STRAY or below:
-            worlds.open[worlds.of_vert[at.vert[0]]] = FIRST_LOOK
+            worlds.open[world] = FIRST_LOOK
             found[OPEN] = 1

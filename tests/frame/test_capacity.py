@@ -87,7 +87,7 @@ def crowd(rng, turned) -> Scene:
 def n_inside(model, state, work) -> int:
     """Number of vertices inside other bodies; the broad phase looks first."""
     broad_phase.refresh(model, state.x, state.x, work)
-    narrow_phase.find_inner_vertices(model, state.x, state.x, work)
+    narrow_phase.find_vertices(model, state.x, state.x, work)
     return int(work.contacts.n_vertex.numpy()[0])
 
 

@@ -30,10 +30,10 @@ LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.6
 KEEP = 0.9
 
 
-def steps_per_second(omega, speed, thickness, edge, overlaps: bool):
+def steps_per_second(omega, speed, thickness, edge, overlaps):
     """Steps [1/s] that are stable, and short against the thinnest body and the edges.
 
-    All but the last may be arrays, of one value a world.
+    All may be arrays, of one value a world.
 
     Args:
         omega: largest frequency [1/s]
@@ -44,7 +44,7 @@ def steps_per_second(omega, speed, thickness, edge, overlaps: bool):
     """
     stable = omega / (2.0 * SAFETY)
     passing = speed / (REACH * thickness)
-    travel = LINGERING if overlaps else TRAVEL
+    travel = np.where(overlaps, LINGERING, TRAVEL)
     gentle = np.minimum(speed / (travel * edge), PATIENCE * stable)
     return np.maximum(np.maximum(stable, passing), gentle)
 

@@ -69,7 +69,7 @@ class StepCount:
         omega, speed = self._with_response(omega), self._speed(state)
         if self._implicit:
             return np.full(self._worlds.n, 8)
-        sizes, overlaps = (self._thickness, self._edge), last.overlapping or self._leaves
+        sizes, overlaps = (self._thickness, self._edge), (last.overlapping > 0) | self._leaves
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
         w = int(n.argmax())

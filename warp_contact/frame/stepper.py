@@ -26,7 +26,7 @@ from warp_contact.frame.step_count import StepCount
 from warp_contact.frame.turns import Turns, segments
 from warp_contact.frame.worlds import Worlds
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
-from warp_contact.step.velocity import answer_of, shift_velocities, velocities_now
+from warp_contact.step.velocity import shift_velocities
 
 HALVED = 3  # times at most that a step is halved because state or stiffness is not finite
 PART = 8  # steps between two checks of the rates, in frames that begin or end with a flat tet
@@ -97,13 +97,19 @@ class Stepper:
             raise
 
     def _step(self, frame: int) -> None:
-        overlapping = self.last.overlapping
-        while overlapping is None or self.grow():
-            overlapping = overlaps(self._model, self._state, self.work)
-        self._overlapping = overlapping
+        self._overlapping = self._find_overlaps()
         rates = self._find_step(frame)
-        old = overlapping and bool(self.work.surface.was_old.numpy()[0])
-        self.last = LastFrame(self._n, self._dt, rates, old)
+        old = self._overlapping & (self.work.surface.was_old.numpy() > 0)
+        self.last = LastFrame(self._n, self._dt, old.astype(int), rates)
+
+    def _find_overlaps(self) -> np.ndarray:
+        """Worlds in which there may be overlaps that no step created."""
+        unknown, found = self.last.overlapping < 0, self.last.overlapping > 0
+        again = unknown.any()
+        while again:
+            found |= unknown & overlaps(self._model, self._state, self.work)
+            again = self.grow()
+        return found
 
     def foresee(self, frame: int) -> int:
         """Steps that frame number ``frame`` will take if none proves too long."""
@@ -119,7 +125,7 @@ class Stepper:
 
     def _all_sleep(self) -> bool:
         """Decide which bodies sleep; where all do, nothing moves in this frame."""
-        if not self.sleeping or self.last.overlapping is not False:  # it has to be searched
+        if not self.sleeping or self.last.overlapping.any():  # it has to be searched
             return False
         if self.sleeping.update(self._state, self.work):
             return False
@@ -183,7 +189,7 @@ class Stepper:
             raise
         contacts.copy(self.work.contacts, found)
         contact_forces.copy(self.work.forces, forces)
-        return now.numpy()
+        return now
 
     def set_velocities(self, values: np.ndarray, at: np.ndarray, body: int) -> None:
         """Set ``values`` [m/s], shape (k, 3), at vertices ``at`` (k,) of a body."""
@@ -192,11 +198,16 @@ class Stepper:
         if self.sleeping:
             self.sleeping.wake(body)
 
-    def set_positions(self, x: np.ndarray) -> None:
-        """Set positions [m], shape (n_vert, 3); overlaps and rates are found before a frame."""
+    def set_positions(self, x: np.ndarray, at: slice) -> None:
+        """Set positions [m], shape (n_vert, 3), of vertices ``at``; others stay.
+
+        Before a frame, overlaps are found in worlds of these, and the rates.
+        """
         v = self.velocities()
         between.set_positions(self._model, self._state, self.work, self.last_dt, x, v)
-        self.last = replace(self.last, overlapping=None, rates=None)
+        overlapping = self.last.overlapping.copy()
+        overlapping[self.worlds.of_vert[at]] = -1
+        self.last = replace(self.last, overlapping=overlapping, rates=None)
         if self.sleeping:
             self.sleeping.wake_all(self.work)
 
@@ -233,10 +244,11 @@ class Stepper:
         """The last step of each vertex [s], shape (n_vert,)."""
         return self.last.dt[self.worlds.of_vert]
 
-    def _velocities(self) -> wp.array:
+    def _velocities(self) -> np.ndarray:
         self.buffers.set_step(float(self.last.dt.max()))
-        answer = answer_of(self.buffers.response, self.last.overlapping is False)
-        return velocities_now(self._model, self._state, self.work, self.last_dt, answer)
+        apart = (self.last.overlapping == 0)[self.worlds.of_vert]
+        given = self.work, self.last_dt, self.buffers.response, apart
+        return between.velocities(self._model, self._state, *given)
 
     def _run(self, rates: np.ndarray, frame: int, in_parts: np.ndarray) -> tuple[np.ndarray, str]:
         """Step the frame for the rates given [1/s], shape (2, n_world).
@@ -251,7 +263,7 @@ class Stepper:
             self.sleeping.begin_frame(self._state, work)
         else:
             contact_forces.clear(work.forces)
-        now = replace(self.last, overlapping=self._overlapping)
+        now = replace(self.last, overlapping=self._overlapping.astype(int))
         self._n = self._steps(rates, now, frame)
         self._dt = 1.0 / (self.fps * self._n)
         if work.damping and stages_for(rates[1], self._dt) > MOST:
@@ -264,8 +276,9 @@ class Stepper:
         work.dt.assign(self._dt[of_vert].astype(np.float32))
         work.overflow.all.zero_()
         work.surface.was_old.zero_()
+        work.worlds.apart.assign((~self._overlapping).astype(np.int32))
         work.broad_phase.bodies.rebuild()
-        graph = self.buffers.graph(damping_stages, bool(self._overlapping))
+        graph = self.buffers.graph(damping_stages, bool(self._overlapping.any()))
         part = PART if in_parts.any() else self._n.max()
         for count, begun, ends in segments(self._n, part):
             if self._turns:

@@ -164,3 +164,61 @@ def test_nor_does_one_that_is_put_into_itself_on_the_way(observed):
         sim.step_frame(), alone.step_frame()
         np.testing.assert_array_equal(seen(sim.positions, ours), alone.positions())
         np.testing.assert_array_equal(seen(sim.velocities, ours), alone.velocities())
+
+
+CALM = NeoHookean(3e4, 0.3, 1000.0, 1e-2)
+
+
+def at_rest(scene: Scene, world: int = 0) -> None:
+    """Blocks that fall asleep, one of which is hit by the next before it could be."""
+    for x, speed in ((0.0, 0.0), (0.3, 0.0), (-1.0, 0.7)):
+        velocity = (speed, 0.0, 0.0)
+        scene.add_body(box(0.1, 2), CALM, (x, 0.0, 0.0502), velocity=velocity, world=world)
+
+
+def standing(scene: Scene, world: int = 1) -> None:
+    """A block that rests on a fixed one, and sleeps soon."""
+    scene.add_body(box(0.1, 2), CALM, (0.0, 0.0, 0.05), fixed=True, world=world)
+    scene.add_body(box(0.1, 2), CALM, (0.01, 0.0, 0.1502), world=world)
+
+
+SLEEPERS = {"hit": at_rest, "standing": standing}
+
+
+def sleepers(*bodies) -> Simulation:
+    scene = Scene(friction=0.1)
+    scene.add_plane((0.0, 0.0, 1.0))
+    for arguments, named in bodies:
+        scene.add_body(*arguments, **named)
+    return Simulation(scene, sleeping=True)
+
+
+@pytest.mark.parametrize("neighbour", [stiff, inside, standing])
+@pytest.mark.parametrize("observed", SLEEPERS)
+def test_worlds_may_sleep_by_themselves(observed, neighbour, tmp_path):
+    """The observed world falls asleep, is woken, and sleeps again, beside one that goes on."""
+    ours, theirs = Bodies(), Bodies()
+    SLEEPERS[observed](ours, world=3)
+    neighbour(theirs)
+    beside, alone = sleepers(*theirs, *ours), sleepers(*ours)
+    own = [body.index for body in beside.scene.bodies if body.world == 3]
+    slept, n = set(), len(alone.positions())
+    for frame in range(110):
+        if frame in (40, 60):  # a neighbour begins anew
+            beside.reset([1])
+        if frame == 70:
+            beside.save(tmp_path / "asleep")
+            beside = sleepers(*theirs, *ours)
+            beside.load(tmp_path / "asleep")
+        if frame == 80:  # woken from outside
+            for sim, body in ((beside, own[-1]), (alone, len(own) - 1)):
+                sim.set_velocity(body, (0.0, 0.0, 0.4))
+        beside.step_frame(), alone.step_frame()
+        np.testing.assert_array_equal(seen(beside.positions, own), alone.positions())
+        np.testing.assert_array_equal(seen(beside.velocities, own), alone.velocities())
+        awake = [sim._stepper.work.awake.bodies.numpy() for sim in (beside, alone)]
+        np.testing.assert_array_equal(awake[0][own], awake[1])
+        slept.add(int((awake[1] == 0).sum()))
+        pressures = [sim.contact_fields()["pressure"] for sim in (beside, alone)]
+        np.testing.assert_array_equal(pressures[0][-n:], pressures[1])
+    assert {"hit": {0, 2}, "standing": {0, 1, 2}}[observed] == slept

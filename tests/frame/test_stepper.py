@@ -7,7 +7,7 @@ import warp as wp
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import allocate_work
-from warp_contact.frame import step_bounds, stepper
+from warp_contact.frame import overlap, step_bounds, stepper
 from warp_contact.frame.buffers import Buffers
 
 DRY = NeoHookean(1e5, 0.3, 1000.0)  # without damping
@@ -259,7 +259,7 @@ def test_a_frame_that_explodes_is_repeated_before_its_buffers_grow(looks, monkey
         return call
 
     monkeypatch.setattr(step_bounds, "raised", remember("repeat", raised))
-    monkeypatch.setattr(stepper, "overlaps", lambda *_: False)
+    monkeypatch.setattr(overlap, "overlaps", lambda *_: np.zeros(1, dtype=bool))
     monkeypatch.setattr(Buffers, "replace", remember("grow", replaced))
     looks(sim, 1000, lambda found: (100.0 * found[0], found[1]))  # as if it had exploded
     assert done[0] == "repeat" and "grow" in done

@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 
 from warp_contact.data.model import Model
+from warp_contact.frame.krylov import ritz_pairs, start_vectors
 from warp_contact.frame.worlds import Worlds
 from warp_contact.kernels.elastic import neo_hookean, shape
 from warp_contact.kernels.motion import lanczos
@@ -16,12 +17,10 @@ SHORT = 4  # in later calls
 CHUNK = 64  # vertices summed by one thread
 FIRST, LATER = (3, 8), (1, 2)  # fewest and most restarts in the first call, in later calls
 NOISE = 0.1  # random part of a restart, so that a mode elsewhere can appear
-SECOND = 0.3  # part of the second mode in a restart, so that it can overtake
 CONVERGED = 0.02  # gap between estimate and bound at which restarts end, relative to lambda
 LITTLE = 0.01  # change of shape, see elastic/shape.py, that moves a rate by some percent at most
 MUCH = 0.2  # change that makes a frequency at most SLOWER times as large, a damping its square
 SLOWER = 4.0
-SEED = 20051125
 
 
 class Spectrum:
@@ -43,9 +42,7 @@ class Spectrum:
             times in a few steps, shape (n_world,)
     """
 
-    def __init__(
-        self, model: Model, worlds: Worlds | None = None, implicit: bool = False
-    ) -> None:
+    def __init__(self, model: Model, worlds: Worlds | None = None, implicit: bool = False):
         """Allocate about 160 bytes per vertex and 84 per tet on the current device.
 
         ``worlds`` are those that do not depend on each other; without them all bodies are one.
@@ -62,7 +59,7 @@ class Spectrum:
         self._basis = wp.zeros((DEPTH + 1, model.n_vert), dtype=wp.vec3)
         self._f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
         self._x = wp.empty(model.n_vert, dtype=wp.vec3)
-        self._noise = wp.array(_noise(model, self._worlds), dtype=wp.vec3)
+        self._noise = wp.array(start_vectors(model, self._worlds), dtype=wp.vec3)
         self._start: dict[Callable, wp.array] = {}
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
         self._before = wp.zeros(model.n_tet, dtype=wp.mat33)
@@ -203,7 +200,7 @@ class Spectrum:
             if not np.isfinite(coef).all():
                 del self._start[apply]
                 return np.full(self._model.n_body, np.inf)
-            theta, residual, ritz = _ritz_pairs(coef)
+            theta, residual, ritz = ritz_pairs(coef)
             self._restart(ritz)
             bound = theta + residual
             done = worlds.most(bound) <= (1.0 + CONVERGED) * worlds.most(theta)
@@ -275,30 +272,3 @@ def _chunks(body_vert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     within = np.arange(body_chunk[-1]) - np.repeat(body_chunk[:-1], count)
     first = np.repeat(body_vert[:-1], count) + CHUNK * within
     return np.append(first, body_vert[-1]), body_chunk
-
-
-def _noise(model: Model, worlds: Worlds) -> np.ndarray:
-    """Random vectors of mass norm 1 for each body, whatever other worlds there are: (n_vert, 3)."""
-    u = np.empty((model.n_vert, 3))
-    ends = np.cumsum(np.bincount(worlds.of_vert))
-    for own in np.split(np.argsort(worlds.of_vert, kind="stable"), ends[:-1]):
-        u[own] = np.random.default_rng(SEED).standard_normal((len(own), 3))
-    u = np.where(model.inv_mass.numpy()[:, None] > 0.0, u, 0.0)
-    body = model.vert_body.numpy()
-    norm2 = np.bincount(body, model.mass.numpy() * (u * u).sum(axis=1), minlength=model.n_body)
-    return u / np.sqrt(np.where(norm2 > 0.0, norm2, 1.0))[body, None]
-
-
-def _ritz_pairs(coef: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest |Ritz value| of each body, its residual norm, and how to restart in the basis."""
-    a, b = coef[1::2].T, np.sqrt(coef[2::2]).T  # (n_body, depth)
-    t = np.zeros((*a.shape, a.shape[1]))
-    k = np.arange(a.shape[1])
-    t[:, k, k] = a
-    t[:, k[1:], k[:-1]] = b[:, :-1]
-    value, vector = np.linalg.eigh(t)
-    order = np.argsort(-np.abs(value), axis=1)
-    body = np.arange(len(t))
-    first, second = vector[body, :, order[:, 0]], vector[body, :, order[:, 1]]
-    residual = b[:, -1] * np.abs(first[:, -1])
-    return np.abs(value[body, order[:, 0]]), residual, first + SECOND * second

@@ -18,7 +18,7 @@ from warp_contact.frame.damping import prepare, stages_for
 from warp_contact.frame.diagnosis import lost_vertex, too_damped
 from warp_contact.frame.frame_start import FrameStart
 from warp_contact.frame.last_frame import LastFrame, none_yet
-from warp_contact.frame.overlap import overlaps
+from warp_contact.frame.overlap import find_overlaps
 from warp_contact.frame.rates import rates_now
 from warp_contact.frame.sleeping import Sleeping
 from warp_contact.frame.spectrum import Spectrum
@@ -62,17 +62,15 @@ class Stepper:
         self.fps, self.wanted = fps, wanted
         # Without gravity, a slow body may be in free flight, not at rest.
         may_sleep = sleeping and any(model.gravity)
-        self.worlds = Worlds(model, apart=not may_sleep)
+        self.worlds = Worlds(model)
         self.last = none_yet(self.worlds.n)
         self.first = state.x.numpy().copy(), state.v.numpy().copy()
         self._model, self._state = model, state
-        self._implicit = implicit
         self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, implicit)
         self.spectrum = Spectrum(model, self.worlds, implicit)
-        self.sleeping = Sleeping(model, state, fps) if may_sleep else None
-        self._turns = Turns(model, self.worlds) if self.worlds.n > 1 else None
-        awake = getattr(self.sleeping or self._turns, "awake", None)
-        self.buffers = Buffers(model, state, response, awake, self.worlds, implicit)
+        self._turns = Turns(model, self.worlds, may_sleep)
+        self.sleeping = Sleeping(model, state, fps, self._turns) if may_sleep else None
+        self.buffers = Buffers(model, state, response, self._turns.awake, self.worlds, implicit)
         self._start = FrameStart(state, self.work)
         self._cut, self._first_capacity = False, self.work.capacity
 
@@ -90,26 +88,21 @@ class Stepper:
         """
         self._begin()
         try:
-            if not self._all_sleep():
+            if self._all_sleep():
+                self.sleeping.skip_frame(self._state, self.work)
+            else:
                 self._step(frame)
         except BaseException:
             self._undo()
             raise
 
     def _step(self, frame: int) -> None:
-        self._overlapping = self._find_overlaps()
+        given = self._model, self._state, self.buffers
+        self._overlapping = find_overlaps(*given, self.last.overlapping, self.grow)
         rates = self._find_step(frame)
         old = self._overlapping & (self.work.surface.was_old.numpy() > 0)
-        self.last = LastFrame(self._n, self._dt, old.astype(int), rates)
-
-    def _find_overlaps(self) -> np.ndarray:
-        """Worlds in which there may be overlaps that no step created."""
-        unknown, found = self.last.overlapping < 0, self.last.overlapping > 0
-        again = unknown.any()
-        while again:
-            found |= unknown & overlaps(self._model, self._state, self.work)
-            again = self.grow()
-        return found
+        n = np.where(self._turns.idle, self.last.n, self._n)
+        self.last = LastFrame(n, self._dt, old.astype(int), rates)
 
     def foresee(self, frame: int) -> int:
         """Steps that frame number ``frame`` will take if none proves too long."""
@@ -124,13 +117,9 @@ class Stepper:
         return self._step_count.steps(self._state, of_bodies, rates[0], last, frame)
 
     def _all_sleep(self) -> bool:
-        """Decide which bodies sleep; where all do, nothing moves in this frame."""
-        if not self.sleeping or self.last.overlapping.any():  # it has to be searched
-            return False
-        if self.sleeping.update(self._state, self.work):
-            return False
-        self.sleeping.skip_frame(self._state, self.work)
-        return True
+        """Decide which bodies sleep, and whether all do; not in worlds that have to be searched."""
+        calm = self.last.overlapping == 0
+        return self.sleeping and not self.sleeping.update(self._state, self.work, calm)
 
     def _find_step(self, frame: int) -> np.ndarray:
         """Step the frame until its steps fit; return the last rates [1/s], (2, n_world)."""
@@ -209,7 +198,7 @@ class Stepper:
         overlapping[self.worlds.of_vert[at]] = -1
         self.last = replace(self.last, overlapping=overlapping, rates=None)
         if self.sleeping:
-            self.sleeping.wake_all(self.work)
+            self.sleeping.wake_all(overlapping < 0, self.work)
 
     def reset(self) -> None:
         """Begin anew from the first positions and velocities."""
@@ -226,7 +215,7 @@ class Stepper:
         self.work.contacts.n.zero_()
         self.work.broad_phase.stale.fill_(1)
         if self.sleeping:
-            self.sleeping.wake_all(self.work)
+            self.sleeping.wake_all(self.last.overlapping < 0, self.work)
 
     def grow(self) -> bool:
         """Enlarge the buffers that the frame outgrew, and go back to its start; True if any."""
@@ -257,15 +246,15 @@ class Stepper:
         ``in_parts`` no longer fit, or where buffers were too small.
         """
         work, of_vert = self.work, self.worlds.of_vert
-        if self._turns:
-            self._turns.let_all(work)
+        self._turns.let_all(work)
         if self.sleeping:
             self.sleeping.begin_frame(self._state, work)
         else:
             contact_forces.clear(work.forces)
         now = replace(self.last, overlapping=self._overlapping.astype(int))
-        self._n = self._steps(rates, now, frame)
-        self._dt = 1.0 / (self.fps * self._n)
+        idle = self._turns.idle
+        self._n = np.where(idle, 0, self._steps(rates, now, frame))
+        self._dt = np.where(idle, self.last.dt, 1.0 / (self.fps * np.maximum(self._n, 1)))
         if work.damping and stages_for(rates[1], self._dt) > MOST:
             wrong = too_damped(self._model, self.spectrum.of_bodies[1], self._dt)
             raise SimulationError(f"frame {frame}: {wrong}")
@@ -281,8 +270,7 @@ class Stepper:
         graph = self.buffers.graph(damping_stages, bool(self._overlapping.any()))
         part = PART if in_parts.any() else self._n.max()
         for count, begun, ends in segments(self._n, part):
-            if self._turns:
-                self._turns.begin(begun, self._dt, work, self._start)
+            self._turns.begin(begun, self._dt, work, self._start)
             work.steps.fill_(count)
             wp.capture_launch(graph)
             if ends or enlarged(work) is not None:
@@ -290,6 +278,7 @@ class Stepper:
                 after, wrong = rates_now(self._model, self._state, *given)
                 if wrong or not self._fit(rates, after).all() or enlarged(work) is not None:
                     break
+        self._turns.end(work, self._start)
         return after, wrong
 
     def _begin(self) -> None:
@@ -304,12 +293,11 @@ class Stepper:
         """Leave the frame as if it had not begun, wherever it was interrupted."""
         self.last = self._before
         self.spectrum.remind(self._memory)
+        self._put_back()
         if self.sleeping:
             self.sleeping.undo()
-        self._put_back()
 
     def _put_back(self) -> None:
         self.buffers.mend(self._start.n_pair)
-        if self._turns:
-            self._turns.let_all(self.work)
+        self._turns.let_all(self.work)
         self._start.undo(self._state, self.work)

@@ -81,6 +81,29 @@ def test_a_frame_that_blows_up_is_tried_again_with_shorter_steps(monkeypatch):
         pull()
 
 
+def test_the_steps_of_other_worlds_stay_as_they_are():
+    """One is pulled until it blows up, and takes twice as many steps."""
+
+    def run(neighbours: int) -> Simulation:
+        scene, mesh = Scene(gravity=(0.0, 0.0, 0.0)), box(0.1, 3)
+        z = mesh.vertices[:, 2]
+        for _ in range(neighbours):
+            scene.add_body(mesh, NeoHookean(1e6, 0.45, 1000.0), fixed=abs(z) > 0.049, world=1)
+        for k in range(2):
+            place, velocity = (0.0, 0.0, 0.11 * k), (0.0, 0.0, -0.1 * k)
+            scene.add_body(box(0.1, 2), DRY, place, velocity=velocity)
+        sim = Simulation(scene, fps=1.0)
+        for body in range(neighbours):
+            sim.set_velocity(body, (0.0, 0.0, 0.2), np.flatnonzero(z > 0.049))
+        sim.step_frame()
+        return sim
+
+    beside, alone = run(1), run(0)
+    n = len(alone.positions())
+    np.testing.assert_array_equal(beside.positions()[-n:], alone.positions())
+    np.testing.assert_array_equal(beside.velocities()[-n:], alone.velocities())
+
+
 @pytest.mark.parametrize("times", [1, 4])
 def test_so_is_one_whose_end_has_no_finite_stiffness(monkeypatch, times):
     sim, other = let_go(0.9), let_go(0.9)

@@ -89,7 +89,7 @@ class Sleeping:
         self._frames[body : body + 1].zero_()
 
     def wake_all(self, of: np.ndarray, work: Work) -> None:
-        """Wake all bodies of worlds, a mask: in the next frame they are awake, and begin to rest."""
+        """Wake all bodies of worlds, a mask: in the next frame they are awake and begin to rest."""
         own = of[self._turns.worlds.of_body]
         self._frames.assign(np.where(own, 0, self._frames.numpy()).astype(np.int32))
         self._before = np.where(own, 1, self._before).astype(np.int32)
@@ -97,9 +97,30 @@ class Sleeping:
         self._pause(work)
 
     def update(self, state: State, work: Work, of: np.ndarray) -> bool:
-        """Before a frame: decide which bodies of worlds, a mask, sleep. False when all bodies do."""
-        model, awake = self.model, self.awake
-        of_body = self._turns.worlds.of_body
+        """Before a frame: decide which bodies of worlds, a mask, sleep.
+
+        Where all bodies of the scene do, stop everything, and return False.
+        """
+        self._count_rest(state, of)
+        bodies = self.awake.bodies.numpy()
+        if bodies.all() and self._before.all():
+            return True
+        broad = work.broad_phase
+        boxes.of_bodies(self.model, state.x, self._reach, broad.lower, broad.upper)
+        broad.bodies.rebuild()
+        self._again.fill_(1)
+        wp.capture_while(self._again, lambda: self._wake(work))
+        bodies = self.awake.bodies.numpy()
+        if (bodies != self._before).any():
+            self._before = bodies.copy()
+            self._pause(work)
+        if not bodies.any():
+            self._skip_frame(state, work)
+        return bool(bodies.any())
+
+    def _count_rest(self, state: State, of: np.ndarray) -> None:
+        """Count for how long bodies of worlds, a mask, have been at rest: the others are awake."""
+        model, of_body = self.model, self._turns.worlds.of_body
         self._world.assign(np.where(of[of_body], of_body, -1).astype(np.int32))
         self._moved.zero_()
         self._speed.zero_()
@@ -122,21 +143,8 @@ class Sleeping:
             dim=model.n_body,
             inputs=[self._wanted, self._time, gravity, self._world, model.body_edge, self._moved]
             + [self._speed],
-            outputs=[self._frames, awake.bodies, self._reach],
+            outputs=[self._frames, self.awake.bodies, self._reach],
         )
-        bodies = awake.bodies.numpy()
-        if bodies.all() and self._before.all():
-            return True
-        broad = work.broad_phase
-        boxes.of_bodies(model, state.x, self._reach, broad.lower, broad.upper)
-        broad.bodies.rebuild()
-        self._again.fill_(1)
-        wp.capture_while(self._again, lambda: self._wake(work))
-        bodies = awake.bodies.numpy()
-        if (bodies != self._before).any():
-            self._before = bodies.copy()
-            self._pause(work)
-        return bool(bodies.any())
 
     def _pause(self, work: Work) -> None:
         """Let bodies sleep, and have the pairs found again."""
@@ -153,8 +161,7 @@ class Sleeping:
             outputs=[self.awake.bodies, self._again],
         )
 
-    def skip_frame(self, state: State, work: Work) -> None:
-        """Stop everything."""
+    def _skip_frame(self, state: State, work: Work) -> None:
         state.v.zero_()
         self.awake.inv_mass.zero_()
         work.contacts.n.zero_()

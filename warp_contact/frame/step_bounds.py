@@ -94,6 +94,11 @@ def raised(before, after, dt, least: float = RAISED):
     return np.minimum(slow, most), np.maximum(before[1], fast)
 
 
+def doubled(before, dt):
+    """Frequency and damping rate [1/s] for the repeat of a frame whose steps ``dt`` [s] blew up."""
+    return 2.0 * np.stack([np.maximum(before[0], served(dt)), before[1]])
+
+
 def fault(dt: float, omega: float, speed: float, thickness: float) -> str:
     """Why a step ``dt`` [s] that the user chose cannot be taken; empty if it can.
 

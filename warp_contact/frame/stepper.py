@@ -15,7 +15,7 @@ from warp_contact.frame import between, step_bounds
 from warp_contact.frame.buffers import Buffers
 from warp_contact.frame.capacity import enlarged
 from warp_contact.frame.damping import prepare, stages_for
-from warp_contact.frame.diagnosis import lost_vertex, too_damped
+from warp_contact.frame.diagnosis import finite_vertices, too_damped
 from warp_contact.frame.frame_start import FrameStart
 from warp_contact.frame.last_frame import LastFrame, none_yet
 from warp_contact.frame.overlap import find_overlaps
@@ -88,9 +88,7 @@ class Stepper:
         """
         self._begin()
         try:
-            if self._all_sleep():
-                self.sleeping.skip_frame(self._state, self.work)
-            else:
+            if not self._all_sleep():
                 self._step(frame)
         except BaseException:
             self._undo()
@@ -137,22 +135,21 @@ class Stepper:
                 after, wrong = self._run(rates, frame, in_parts)
                 fits = self._fit(rates, after)
             self._cut = self._cut or enlarged(self.work) is not None  # what explodes never grows
-            flat = in_parts | bool(wrong) | self._flat()
+            lost = ~np.isfinite(after).all(axis=0)
+            flat = in_parts | lost | self._flat()
             again = flat & ~in_parts
             if not wrong and (fits & ~again).all():
                 return after
             self._start.go_back(self._state, self.work)
             if wrong:
-                if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
+                if self.wanted or halved == HALVED or not finite_vertices(self._state).all():
                     raise SimulationError(f"frame {frame}: {wrong} ({self._n.max()} substeps)")
                 halved += 1
-                served = np.maximum(rates[0], step_bounds.served(self._dt))
-                rates = 2.0 * np.stack([served, rates[1]])
-            else:
-                self.spectrum.remind(kept, fits & ~again)  # these take the same steps again
-                least = np.where(in_parts, step_bounds.CUT_SHORT, step_bounds.RAISED)
-                rates = np.where(fits, rates, step_bounds.raised(rates, after, self._dt, least))
-            in_parts = flat
+            self.spectrum.remind(kept, fits & ~again)  # these take the same steps again
+            least = np.where(in_parts, step_bounds.CUT_SHORT, step_bounds.RAISED)
+            higher = step_bounds.raised(rates, after, self._dt, least)
+            higher = np.where(lost, step_bounds.doubled(rates, self._dt), higher)
+            rates, in_parts = np.where(fits, rates, higher), flat
         stiffest = self._model.labels[int(self.spectrum.of_bodies[0].argmax())]
         raise SimulationError(f"frame {frame}: no step is stable, not for body '{stiffest}'")
 

@@ -22,7 +22,7 @@ def take_steps(model: Model, state: State, work: Work, damping_stages: int, one:
 
 
 def step_of(response: ContactSurface | Penalty | PredictedForce, overlapping: bool) -> Callable:
-    """The step of a response; ``overlapping`` where bodies of a world may have overlapped before."""
+    """The step of a response; ``overlapping`` where bodies may have overlapped in a world."""
     if isinstance(response, Penalty):
         return partial(step_penalty, response=response)
     if isinstance(response, PredictedForce):

@@ -69,9 +69,7 @@ def _search(model: Model, state: State, work: Work, iterations: int) -> None:
         search.keep_spin(model, state, work)
 
 
-def _close(
-    model: Model, state: State, work: Work, look: int, before: float, apart: float
-) -> None:
+def _close(model: Model, state: State, work: Work, look: int, before: float, apart: float) -> None:
     """Close all contacts but those that overlapped by more than some edges at the start.
 
     ``before`` in worlds where bodies may have overlapped then, ``apart`` where they were apart.

@@ -94,9 +94,21 @@ def raised(before, after, dt, least: float = RAISED):
     return np.minimum(slow, most), np.maximum(before[1], fast)
 
 
-def doubled(before, dt):
-    """Frequency and damping rate [1/s] for the repeat of a frame whose steps ``dt`` [s] blew up."""
-    return 2.0 * np.stack([np.maximum(before[0], served(dt)), before[1]])
+def explodes(before, after, dt):
+    """Whether the rates ``after`` are above what ``raised`` takes for true, or infinite."""
+    fast = after[0] > EXPLODED * np.maximum(before[0], served(dt))
+    return fast | (after[1] > EXPLODED**2 * np.maximum(before[1], 1.0 / dt))
+
+
+def repeated(before, after, dt, in_parts):
+    """Frequency and damping rate [1/s] for the repeat of a frame: as ``raised``.
+
+    A step that was looked at ``in_parts`` failed before the end of its frame. Where a world is lost
+    ``after`` it, it takes twice as many.
+    """
+    higher = raised(before, after, dt, np.where(in_parts, CUT_SHORT, RAISED))
+    doubled = 2.0 * np.stack([np.maximum(before[0], served(dt)), before[1]])
+    return np.where(np.isfinite(after).all(axis=0), higher, doubled)
 
 
 def fault(dt: float, omega: float, speed: float, thickness: float) -> str:

@@ -88,7 +88,8 @@ class Stepper:
         """
         self._begin()
         try:
-            if not self._all_sleep():
+            calm = self.last.overlapping == 0  # other worlds have to be searched
+            if not self.sleeping or self.sleeping.update(self._state, self.work, calm):
                 self._step(frame)
         except BaseException:
             self._undo()
@@ -114,11 +115,6 @@ class Stepper:
         of_bodies = self.spectrum.of_bodies[0]
         return self._step_count.steps(self._state, of_bodies, rates[0], last, frame)
 
-    def _all_sleep(self) -> bool:
-        """Decide which bodies sleep, and whether all do; not in worlds that have to be searched."""
-        calm = self.last.overlapping == 0
-        return self.sleeping and not self.sleeping.update(self._state, self.work, calm)
-
     def _find_step(self, frame: int) -> np.ndarray:
         """Step the frame until its steps fit; return the last rates [1/s], (2, n_world)."""
         rates = self._rates()
@@ -128,15 +124,15 @@ class Stepper:
         for _ in range(ATTEMPTS):
             kept = self.spectrum.memory()
             after, wrong = self._run(rates, frame, in_parts)
-            fits = self._fit(rates, after)
-            while not wrong and fits.all() and self.grow():
+            while not (wrong or self._explode(rates, after).any()) and self.grow():
                 self.spectrum.remind(kept)
                 kept = self.spectrum.memory()
                 after, wrong = self._run(rates, frame, in_parts)
-                fits = self._fit(rates, after)
-            self._cut = self._cut or enlarged(self.work) is not None  # what explodes never grows
-            lost = ~np.isfinite(after).all(axis=0)
-            flat = in_parts | lost | self._flat()
+            full = enlarged(self.work) is not None  # what explodes never grows
+            self._cut = self._cut or full
+            counts = self._explode(rates, after) | (not full)  # worlds of which the frame tells
+            fits = self._fit(rates, after) | ~counts
+            flat = in_parts | (counts & (self._flat() | ~np.isfinite(after).all(axis=0)))
             again = flat & ~in_parts
             if not wrong and (fits & ~again).all():
                 return after
@@ -146,9 +142,7 @@ class Stepper:
                     raise SimulationError(f"frame {frame}: {wrong} ({self._n.max()} substeps)")
                 halved += 1
             self.spectrum.remind(kept, fits & ~again)  # these take the same steps again
-            least = np.where(in_parts, step_bounds.CUT_SHORT, step_bounds.RAISED)
-            higher = step_bounds.raised(rates, after, self._dt, least)
-            higher = np.where(lost, step_bounds.doubled(rates, self._dt), higher)
+            higher = step_bounds.repeated(rates, after, self._dt, in_parts)
             rates, in_parts = np.where(fits, rates, higher), flat
         stiffest = self._model.labels[int(self.spectrum.of_bodies[0].argmax())]
         raise SimulationError(f"frame {frame}: no step is stable, not for body '{stiffest}'")
@@ -161,6 +155,10 @@ class Stepper:
         """Worlds whose steps, chosen for ``rates`` [1/s], fit the rates ``after`` them."""
         damped = step_bounds.stays_damped(self._dt, rates[1], after[1])
         return damped if self.wanted else damped & step_bounds.stays_stable(self._dt, after[0])
+
+    def _explode(self, rates: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Those that do not fit at all, by ``step_bounds.explodes``."""
+        return ~self._fit(rates, after) & step_bounds.explodes(rates, after, self._dt)
 
     def velocities(self) -> np.ndarray:
         """Velocities [m/s] at the time of the positions, shape (n_vert, 3)."""

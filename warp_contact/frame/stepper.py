@@ -263,15 +263,15 @@ class Stepper:
         work.worlds.apart.assign((~self._overlapping).astype(np.int32))
         work.broad_phase.bodies.rebuild()
         graph = self.buffers.graph(damping_stages, bool(self._overlapping.any()))
-        part = PART if in_parts.any() else self._n.max()
-        for count, begun, ends in segments(self._n, part):
+        for count, begun, looked in segments(self._n, in_parts, PART):
             self._turns.begin(begun, self._dt, work, self._start)
             work.steps.fill_(count)
             wp.capture_launch(graph)
-            if ends or enlarged(work) is not None:
-                given = self.spectrum, in_parts if ends == "part" else None
-                after, wrong = rates_now(self._model, self._state, *given)
-                if wrong or not self._fit(rates, after).all() or enlarged(work) is not None:
+            full = enlarged(work) is not None
+            if full or looked is None or looked.any():
+                given = self._state, self.spectrum, None if full else looked
+                after, wrong = rates_now(self._model, *given)
+                if full or wrong or not self._fit(rates, after).all():
                     break
         self._turns.end(work, self._start)
         return after, wrong

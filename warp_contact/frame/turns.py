@@ -83,16 +83,20 @@ class Turns:
         work.broad_phase.stale.fill_(1)
 
 
-def segments(n: np.ndarray, part: int) -> Iterator[tuple[int, np.ndarray, str]]:
-    """Numbers of steps to take at once, ``part`` at most, and which worlds have begun by then.
+def segments(
+    n: np.ndarray, in_parts: np.ndarray, part: int
+) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
+    """Numbers of steps to take at once, which worlds have begun by then, and which to look at then.
 
-    ``n`` are the steps of each world in the frame, shape (n,), 0 for one that sleeps. The third
-    value says whether a part or the frame ends with these steps: what others do must not decide
-    when a world is looked at.
+    ``n`` are the steps of each world in the frame, shape (n,), 0 for one that sleeps. Worlds
+    ``in_parts``, a mask, are looked at after every ``part`` steps of their own: what others do must
+    not decide when. At the end of the frame all are, None.
     """
     most = int(n.max())
-    starts = {*(most - np.unique(n[n > 0])).tolist(), *range(0, most, part)}
-    bounds = [*sorted(starts), most]
-    for first, last in pairwise(bounds):
-        ends = "frame" if last == most else "part" if last % part == 0 else ""
-        yield last - first, most - n <= first, ends
+    first = most - n
+    bounds = {most, *first[n > 0].tolist()}
+    for w in np.flatnonzero(in_parts & (n > 0)):
+        bounds.update(range(int(first[w]), most, part))
+    for begin, end in pairwise(sorted(bounds)):
+        looked = in_parts & (first < end) & ((end - first) % part == 0)
+        yield end - begin, first <= begin, None if end == most else looked

@@ -26,10 +26,13 @@ class Worlds:
     """What is known of each world in a step."""
 
     of_vert: wp.array[int]  # (n_vert,) number of the world of each vertex
+    apart: wp.array[int]  # (n_world,) 1 where no bodies overlapped when the step began
     negligible: wp.array[float]  # (n_world,) [m] a smaller change in a step affects no contact
     doing: wp.array[int]  # (n_world,) RUNNING, LAST or DONE
     asking: wp.array[int]  # (n_world,) 1 where a contact needs another sweep
     open: wp.array[int]  # (n_world,) the last look that found an overlap to be closed
+    old: wp.array[int]  # (n_world,) 1 where an overlap is for the search: it is older than the step
+    was_old: wp.array[int]  # (n_world,) 1 where there was one since the frame began
     has_new: wp.array[int]  # (n_world,) 1 where the last pass found a new contact of an edge
     sweep: wp.array[int]  # (1,) number of the present sweep
 

@@ -155,16 +155,13 @@ def stages():
 
 
 def _find_contacts(model, work, x0, x=None, edges=False, apart=False) -> SimpleNamespace:
-    from warp_contact.data.launch import if_any
-    from warp_contact.step import broad_phase, detection, impulse, narrow_phase
+    from warp_contact.step import broad_phase, detection
 
     x = x0 if x is None else x
+    work.worlds.apart.fill_(int(apart))
     broad_phase.refresh(model, x0, x, work)
     if edges:
-        (detection.detect_apart if apart else detection.detect)(model, x0, x, work)
-    elif apart:
-        narrow_phase.find_entered_vertices(model, x0, x, work)
-        if_any(work.contacts.n, impulse.begin, model, x0, work)
+        detection.detect(model, x0, x, work)
     else:
         detection.detect_vertices(model, x0, x, work)
     assert not work.overflow.all.numpy().any()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warp_contact import NeoHookean, Penalty, Scene, Simulation, box
-from warp_contact.frame import stepper
+from warp_contact.frame import between
 
 G = 9.81
 SOFT = NeoHookean(2e4, 0.3, 1000.0, 2e-3)
@@ -182,14 +182,14 @@ def test_a_reading_that_is_interrupted_changes_nothing(monkeypatch):
         return run(Simulation(scene), 8)
 
     read, left = falling(), falling()
-    pressure, look = read.contact_fields()["pressure"], stepper.velocities_now
+    pressure, look = read.contact_fields()["pressure"], between.velocities_now
 
     def interrupted(*given):
         look(*given)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(stepper, "velocities_now", interrupted)
+        patch.setattr(between, "velocities_now", interrupted)
         read.velocities()
     np.testing.assert_array_equal(read.contact_fields()["pressure"], pressure)
     assert pressure.any()

@@ -186,7 +186,7 @@ class Simulation:
         self._bodies.refuse_far(x, body)
         with exclusively(self.device):
             self._meter.tunnelling.follow(self.state.x)
-            self._stepper.set_positions(x)
+            self._stepper.set_positions(x, self._bodies.range(body))
             own = self.model.vert_body.numpy()[self._bodies.range(body)]
             self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
 

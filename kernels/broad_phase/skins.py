@@ -11,8 +11,9 @@ New pairs are also found when a body moves further than FASTER reserves in a ste
     reserve = max(d, LEAST_SKIN e / 2) + D / 2                   [m]     skin = free + reserve
 
 d is the largest predicted motion of the body in a step, D that of the bodies near it, e the
-shortest edge of its world. r is the motion that is left of d where contacts take the rest, as at rest: the
-larger one of the last motions under impulses and of the mean motion since pairs were last found.
+shortest edge of its world. r is the motion that is left of d where contacts take the rest, as at
+rest: the larger one of the last motions under impulses and of the mean motion since pairs were last
+found.
 ``looks`` is the number of steps that the pairs should last. It is the same for all
 bodies, and such that looks r is MEAN_SKIN edges on average. A few fast
 bodies then do not use up the pairs of a pile at rest, and skins stay narrow where all bodies are

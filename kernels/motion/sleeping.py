@@ -22,6 +22,7 @@ def watch(
     # in
     time: float,  # of a frame [s]
     vert_body: wp.array[int],  # (n_vert,)
+    world: wp.array[int],  # (n_body,) its number, -1 for a body that may not sleep
     body_edge: wp.array[float],  # (n_body,) [m]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
     anchor: wp.array[wp.vec3],  # (n_vert,) [m] where the rest of its body began
@@ -29,17 +30,16 @@ def watch(
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out, added to
     moved: wp.array[int],  # (n_body,) 1 when a vertex moved
-    speed: wp.array[float],  # (1,) [m/s] of the fastest vertex
-    mobile: wp.array[int],  # (n_body,) 1 when a vertex is not fixed
+    speed: wp.array[float],  # (n_world,) [m/s] of the fastest vertex
 ):
     """One thread per vertex: whether it moves. A fixed one with a velocity always does."""
     i = wp.tid()
     m = vert_body[i]
+    if world[m] < 0:
+        return
     u = wp.length(v[i])
-    wp.atomic_max(speed, 0, u)
-    if inv_mass[i] > 0.0:
-        mobile[m] = 1
-    elif u > 0.0:
+    wp.atomic_max(speed, world[m], u)
+    if inv_mass[i] == 0.0 and u > 0.0:
         moved[m] = 1
     near = wp.length(x[i] - anchor[i]) <= STILL * body_edge[m]  # False for NaN
     if not near or time * u > FAST * body_edge[m]:
@@ -67,9 +67,10 @@ def count_rest(
     wanted: int,  # frames after which a body may sleep
     time: float,  # of a frame [s]
     gravity: float,  # [m/s^2]
+    world: wp.array[int],  # (n_body,) its number, -1 for a body that may not sleep
     body_edge: wp.array[float],  # (n_body,) [m]
     moved: wp.array[int],  # (n_body,)
-    speed: wp.array[float],  # (1,) [m/s]
+    speed: wp.array[float],  # (n_world,) [m/s]
     # in, out
     frames: wp.array[int],  # (n_body,) for which it has been at rest
     # out
@@ -78,9 +79,11 @@ def count_rest(
 ):
     """One thread per body: count its frames at rest."""
     m = wp.tid()
+    if world[m] < 0:
+        return
     frames[m] = wp.where(moved[m] == 1, 0, wp.min(frames[m] + 1, wanted))
     awake[m] = wp.where(frames[m] < wanted, 1, 0)
-    reach[m] = ISLAND_GAP * body_edge[m] + time * (speed[0] + time * gravity)
+    reach[m] = ISLAND_GAP * body_edge[m] + time * (speed[world[m]] + time * gravity)
 
 
 @wp.kernel
@@ -90,7 +93,7 @@ def wake_island(
     world: wp.array[int],  # (n_body,)
     lower: wp.array[wp.vec3],  # (n_body,) [m]
     upper: wp.array[wp.vec3],  # (n_body,) [m]
-    mobile: wp.array[int],  # (n_body,)
+    mobile: wp.array[int],  # (n_body,) 1 where a vertex is not fixed
     # in, out
     awake: wp.array[int],  # (n_body,)
     # out, added to
@@ -114,33 +117,24 @@ def pause_vertices(
     vert_body: wp.array[int],  # (n_vert,)
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
     awake: wp.array[int],  # (n_body,)
+    idle: wp.array[int],  # (n_body,) 1 in a world of which all bodies sleep
     # out
     pliant: wp.array[float],  # (n_vert,) [1/kg] inv_mass, 0 asleep
     v: wp.array[wp.vec3],  # (n_vert,) [m/s] 0 asleep
     impulse: wp.array[wp.vec3],  # (n_vert,) [N s] of the frame: unchanged asleep, else 0
 ):
-    """One thread per vertex: stop it if asleep; a fixed one gets a new impulse in every frame."""
+    """One thread per vertex: stop it if asleep; a fixed one gets a new impulse in every frame.
+
+    But not where nothing is awake that could exchange one with it.
+    """
     i = wp.tid()
     pliant[i] = 0.0
     if awake[vert_body[i]] == 1:
         pliant[i] = inv_mass[i]
     else:
         v[i] = wp.vec3(0.0, 0.0, 0.0)
-    if awake[vert_body[i]] == 1 or inv_mass[i] == 0.0:
+    if awake[vert_body[i]] == 1 or (inv_mass[i] == 0.0 and idle[vert_body[i]] == 0):
         impulse[i] = wp.vec3(0.0, 0.0, 0.0)
-
-
-@wp.kernel
-def pause_tets(
-    # in
-    tet_body: wp.array[int],  # (n_tet,)
-    awake: wp.array[int],  # (n_body,)
-    # out
-    mask: wp.array[int],  # (n_tet,) 0 asleep
-):
-    """One thread per tet: whether it is awake."""
-    q = wp.tid()
-    mask[q] = awake[tet_body[q]]
 
 
 @wp.kernel

@@ -26,9 +26,7 @@ class Apart:
 
 
 @wp.func
-def gap_along_kept(
-    axis: int, t: wp.vec3i, x: wp.array[wp.vec3], p: wp.vec3, q: wp.vec3
-) -> float:
+def gap_along_kept(axis: int, t: wp.vec3i, x: wp.array[wp.vec3], p: wp.vec3, q: wp.vec3) -> float:
     """Gap [m] between pq and triangle t along one of their axes."""
     a = x[t[0]]
     b = x[t[1]] - a

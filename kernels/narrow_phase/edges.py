@@ -36,7 +36,6 @@ def is_among(found: EdgeContact, first: int, contact: wp.array[EdgeContact]) -> 
 def find_crossings(
     # in
     threads: int,
-    apart: bool,  # bodies did not overlap when the step began
     mesh: Mesh,
     pairs: PairList,  # edges and bodies
     skin: wp.array[float],  # (n_body,) [m]
@@ -86,6 +85,7 @@ def find_crossings(
         if clear > 0.0:
             continue
         edge = mesh.body_edge[body]
+        apart = worlds.apart[worlds.of_vert[e[0]]] != 0
         found = edge_contact(
             mesh.bvh, body, edge, apart, reach, among, pairs.item, mesh.tris, x0, x, e
         )

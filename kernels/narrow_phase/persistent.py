@@ -19,6 +19,7 @@ from warp_contact.kernels.narrow_phase.edge_contact import EdgeContact
 from warp_contact.kernels.narrow_phase.opposing import edge_looks, opposes
 from warp_contact.kernels.narrow_phase.surface_query import face_normal
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -81,21 +82,24 @@ def continue_contacts(
     before: wp.array[EdgeContact],  # (contacts,) of the last step, sorted by edge and body
     pairs: PairList,  # edges and bodies
     mesh: Mesh,
+    worlds: Worlds,
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     # out
     crossing: wp.array[int],  # (capacity + 1,) contacts of the edge with the body, added to
     place: wp.array[int],  # (capacity,) of its first contact in ``contact``, -1 for none
-    contact: wp.array[EdgeContact],  # (contacts,)
-    n_place: wp.array[int],  # (1,)
+    contact: wp.array[EdgeContact],  # (contacts,) those of the last step keep their places
 ):
-    """For each contact of the last step: keep it, with those of the same edge and body."""
-    if wp.tid() == 0:
-        n_place[0] = n_before[0]
+    """For each contact of the last step: keep it, with those of the same edge and body.
+
+    None persists where bodies may overlap and are moved apart.
+    """
     for first in range(wp.tid(), n_before[0], threads):
         if is_like(first - 1, first, n_before[0], before):
             continue
         body = before[first].body
         e = before[first].edge
+        if worlds.apart[worlds.of_vert[mesh.edges[e][0]]] == 0:
+            continue
         c = pairs.start[e]
         end = wp.min(pairs.start[e + 1], place.shape[0])
         while c < end and pairs.pair[c][1] != body:

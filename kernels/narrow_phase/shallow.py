@@ -46,6 +46,7 @@ UNSURE = wp.constant(0)
 ABOVE = wp.constant(1)
 BELOW = wp.constant(2)
 
+
 @wp.struct
 class Place:
     """Where a vertex lies against the triangles within reach."""

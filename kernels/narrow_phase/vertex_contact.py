@@ -34,6 +34,7 @@ from warp_contact.kernels.narrow_phase.surface_query import (
 )
 from warp_contact.kernels.narrow_phase.vertices import Penetration
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -192,7 +193,7 @@ def found_contact(
 def vertex_contacts(
     # in
     threads: int,
-    apart: bool,  # bodies did not overlap when the step began
+    worlds: Worlds,
     mesh: Mesh,
     x0: wp.array[wp.vec3],  # (n_vert,) [m] start of the step
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -218,6 +219,7 @@ def vertex_contacts(
             to.offset = mesh.plane_h[body - mesh.n_body]
             to.depth = to.offset - wp.dot(n, x[i])
         elif mesh.on_surface[i] != 0:
+            apart = worlds.apart[worlds.of_vert[i]] != 0
             out = found_contact(penetration[e], apart, mesh, x0, x)
             if out.found:
                 t = mesh.tris[out.hit.tri]

@@ -36,24 +36,30 @@ PASSES = wp.constant(128)  # at most; corners that meet need more than 32
 def begin_closure(
     # in
     threads: int,
-    bound: float,  # largest move in a step, in edges
-    deep: float,  # of an edge: an overlap at the start of the step that is left out
+    limits: wp.vec3,  # see below, in edges
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
     dt: wp.array[float],  # (n_vert,) [s]
     residual: wp.array[float],  # (capacity,) [m]
+    worlds: Worlds,
     # out
     slack: wp.array[float],  # (capacity,) [m]
     push: wp.array[float],  # (capacity,) [kg m]
 ):
-    """For each contact: the overlap that is left to later steps."""
+    """For each contact: the overlap that is left to later steps.
+
+    The limits are the overlap at the start of the step beyond which a contact is left out, in
+    worlds where bodies may have overlapped before and in those where they were apart, and the
+    largest move in a step.
+    """
     for c in range(wp.tid(), n_contact[0], threads):
         edge = contact[c].edge_length
         slack[c] = 0.0
         if residual[c] > 0.0:
-            slack[c] = wp.max(residual[c] - bound * edge, 0.0) - REST_GAP * edge
-        if -constraint[c].gap_bound * dt[contact[c].vert[0]] > deep * edge:
+            slack[c] = wp.max(residual[c] - limits[2] * edge, 0.0) - REST_GAP * edge
+        i = contact[c].vert[0]
+        if -constraint[c].gap_bound * dt[i] > limits[worlds.apart[worlds.of_vert[i]]] * edge:
             slack[c] = NONE
         push[c] = 0.0
 

@@ -13,6 +13,7 @@ from warp_contact.kernels.mobility import Mobility, mobility_of
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.worlds import Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -24,13 +25,15 @@ def displacement_vectors(
     contact: wp.array[Contact],  # (capacity,)
     residual: wp.array[float],  # (capacity,) [m]
     bodies: Mobility,
+    worlds: Worlds,
+    moves: wp.array[int],  # (n_world,) not 0 where there is something to resolve
     # out
     s: wp.array[wp.vec3],  # (n_vert,) [m], zero outside the region
 ):
     """One thread per vertex: eq. (1); the end of an edge counts with its weight on the edge."""
     i = wp.tid()
     s[i] = wp.vec3(0.0, 0.0, 0.0)
-    if mobility_of(i, bodies) == 0.0:
+    if mobility_of(i, bodies) == 0.0 or moves[worlds.of_vert[i]] == 0:
         return
     own = wp.vec3(0.0, 0.0, 0.0)
     own_weight = float(0.0)

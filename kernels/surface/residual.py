@@ -20,10 +20,9 @@ wp.set_module_options(OPTIONS)
 STRAY = wp.constant(1.0e-3)  # barycentric weight below which a vertex has left its triangle
 
 # Places in ``found``.
-WAS_OLD = wp.constant(0)  # some overlap was for the search, since the frame began
-OPEN = wp.constant(1)  # some overlap is to be closed
-OLD = wp.constant(2)  # some overlap is for the search: it is older than the step
-WORLDS = wp.constant(3)  # from here on, for each world: ``open`` of worlds.py
+OPEN = wp.constant(0)  # some overlap is to be closed
+OLD = wp.constant(1)  # some overlap is for the search: it is older than the step
+WORLDS = wp.constant(2)  # from here on, for each world: ``open``, ``old``, ``was_old`` of worlds.py
 
 
 @wp.kernel
@@ -39,8 +38,8 @@ def residual_gaps(
     # out
     residual: wp.array[float],  # (capacity,) [m], 0 up to the tolerance
     # out, added to
-    worlds: Worlds,  # those with an overlap to be closed
-    found: wp.array[int],  # (3 + n_world,) 1 where it is true
+    worlds: Worlds,  # those with an overlap to be closed, or for the search
+    found: wp.array[int],  # (2 + 3 n_world,) 1 where it is true
 ):
     """For each contact: its overlap at x."""
     for c in range(wp.tid(), n_contact[0], threads):
@@ -50,16 +49,18 @@ def residual_gaps(
             continue
         d = -gap(at, x)
         edge = at.edge_length
+        world = worlds.of_vert[at.vert[0]]
         if d > CLOSURE_TOLERANCE * edge:
             residual[c] = d
-            world = worlds.of_vert[at.vert[0]]
             if worlds.open[world] >= look - 1:
                 worlds.open[world] = look
                 found[OPEN] = 1
         old = -constraint[c].gap_bound * dt[at.vert[0]]
         if d > OLD_OVERLAP * edge and old > OLD_OVERLAP * edge:
-            found[OLD] = 1
-            found[WAS_OLD] = 1
+            if worlds.apart[world] == 0 and worlds.open[world] >= look - 1:
+                worlds.old[world] = 1
+                worlds.was_old[world] = 1
+                found[OLD] = 1
 
 
 @wp.kernel
@@ -73,14 +74,20 @@ def find_strays(
     v: wp.array[wp.vec3],  # (n_vert,) [m/s] by which they moved in the step
     # out, added to
     worlds: Worlds,  # those with an overlap to be closed
-    found: wp.array[int],  # (3 + n_world,) 1 for an overlap
+    found: wp.array[int],  # (2 + 3 n_world,) 1 for an overlap
 ):
-    """For each contact of a vertex with a triangle: whether it slid off it, or lies below it."""
+    """For each contact of a vertex with a triangle: whether it slid off it, or lies below it.
+
+    Not where bodies may have overlapped when the step began.
+    """
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
         if at.coef[0] != 1.0 or at.on_plane:
             continue
         if wp.length_sq(at.normal) == 0.0:
+            continue
+        world = worlds.of_vert[at.vert[0]]
+        if worlds.apart[world] == 0:
             continue
         p = x[at.vert[0]]
         t0 = x[at.vert[2]]
@@ -92,5 +99,5 @@ def find_strays(
         below = wp.dot(p - t0, face) < -least
         slid = dt[at.vert[0]] * wp.length(relative_velocity(at, v)) > least
         if below or (slid and wp.min(w) < -STRAY):
-            worlds.open[worlds.of_vert[at.vert[0]]] = FIRST_LOOK
+            worlds.open[world] = FIRST_LOOK
             found[OPEN] = 1

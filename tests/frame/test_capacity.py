@@ -87,7 +87,7 @@ def crowd(rng, turned) -> Scene:
 def n_inside(model, state, work) -> int:
     """Number of vertices inside other bodies; the broad phase looks first."""
     broad_phase.refresh(model, state.x, state.x, work)
-    narrow_phase.find_inner_vertices(model, state.x, state.x, work)
+    narrow_phase.find_vertices(model, state.x, state.x, work)
     return int(work.contacts.n_vertex.numpy()[0])
 
 
@@ -189,3 +189,21 @@ def test_a_deep_overlap_beyond_the_first_buffer_is_searched_all_the_same():
     for sim in (tiny, ample):
         sim.step_frame()
     np.testing.assert_array_equal(tiny.positions(), ample.positions())
+
+
+@pytest.mark.parametrize("speed", [2.0, 4.0, 6.0])
+def test_buffers_that_were_too_small_leave_no_trace(speed):
+    """Frames in which the steps are too long as well: that is told by the repeat alone."""
+    found = []
+    for room in (Capacity(), Capacity(contacts=4, verts=4, edges=4)):
+        scene = Scene()
+        scene.add_plane((0.0, 0.0, 1.0))
+        for k in range(2):
+            place, rubber = (0.01 * k, 0.0, 0.051 + 0.102 * k), NeoHookean(5e4, 0.35, 1e3, 2e-3)
+            scene.add_body(box(0.1, 2), rubber, place, velocity=(0.0, 0.0, -speed))
+        sim = Simulation(scene)
+        sim._stepper.buffers.replace(room)
+        found.append([(sim.positions(), sim.velocities(), sim.substeps) for _ in sim.frames(4)])
+    for roomy, tight in zip(*found, strict=True):
+        assert all(np.array_equal(one, other) for one, other in zip(roomy, tight, strict=True))
+    assert sim._stepper.work.capacity.contacts > 4

@@ -7,6 +7,7 @@ import warp as wp
 from warp_contact import Scene, Simulation, SimulationError
 from warp_contact import box as block
 from warp_contact.frame.spectrum import Spectrum
+from warp_contact.frame.worlds import Worlds
 from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork
 from warp_contact.step import forces
 
@@ -236,6 +237,21 @@ def test_rates_without_bound_are_not_kept(blob, build_model):
     spectrum = Spectrum(build_model((x, tets, MATERIALS[0])))
     assert rates_of(spectrum, wp.array(1e30 * x, dtype=wp.vec3))[0] == np.inf
     assert np.isfinite(rates_of(spectrum, wp.array(x, dtype=wp.vec3))[0])
+
+
+@pytest.mark.parametrize("times", [1e30, np.nan])
+def test_a_world_that_is_lost_leaves_no_trace_in_others(blob, build_model, times):
+    x, tets = blob((2, 2, 1))
+    alone, both = build_model((x, tets, MATERIALS[0])), build_model(*2 * [(x, tets, MATERIALS[0])])
+    alone.body_world, both.body_world = wp.array([3], dtype=int), wp.array([3, 5], dtype=int)
+    one, two = Spectrum(alone), Spectrum(both, Worlds(both))
+    for k in range(6):
+        y = x * [1.0, 1.0, 1.0 + 0.1 * k]
+        other = times * y if k in (1, 2) else y
+        rates = two.rates(wp.array(np.concatenate([y, other]), dtype=wp.vec3))
+        np.testing.assert_array_equal(rates[:, 0], rates_of(one, wp.array(y, dtype=wp.vec3)))
+        assert np.isfinite(rates[:, 1]).all() == (k not in (1, 2))
+    assert rates[:, 1] == pytest.approx(rates[:, 0], rel=CLOSE)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-3, 1e-5, 1e-6])

@@ -7,7 +7,7 @@ import warp as wp
 from warp_contact import NeoHookean, Scene, Simulation, SimulationError, box
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.work import allocate_work
-from warp_contact.frame import step_bounds, stepper
+from warp_contact.frame import overlap, step_bounds, stepper
 from warp_contact.frame.buffers import Buffers
 
 DRY = NeoHookean(1e5, 0.3, 1000.0)  # without damping
@@ -79,6 +79,29 @@ def test_a_frame_that_blows_up_is_tried_again_with_shorter_steps(monkeypatch):
     monkeypatch.setattr(stepper, "HALVED", 0)
     with pytest.raises(SimulationError, match=r"body0', vertex \d+ is no longer"):
         pull()
+
+
+def test_the_steps_of_other_worlds_stay_as_they_are():
+    """One is pulled until it blows up, and takes twice as many steps."""
+
+    def run(neighbours: int) -> Simulation:
+        scene, mesh = Scene(gravity=(0.0, 0.0, 0.0)), box(0.1, 3)
+        z = mesh.vertices[:, 2]
+        for _ in range(neighbours):
+            scene.add_body(mesh, NeoHookean(1e6, 0.45, 1000.0), fixed=abs(z) > 0.049, world=1)
+        for k in range(2):
+            place, velocity = (0.0, 0.0, 0.11 * k), (0.0, 0.0, -0.1 * k)
+            scene.add_body(box(0.1, 2), DRY, place, velocity=velocity)
+        sim = Simulation(scene, fps=1.0)
+        for body in range(neighbours):
+            sim.set_velocity(body, (0.0, 0.0, 0.2), np.flatnonzero(z > 0.049))
+        sim.step_frame()
+        return sim
+
+    beside, alone = run(1), run(0)
+    n = len(alone.positions())
+    np.testing.assert_array_equal(beside.positions()[-n:], alone.positions())
+    np.testing.assert_array_equal(beside.velocities()[-n:], alone.velocities())
 
 
 @pytest.mark.parametrize("times", [1, 4])
@@ -259,7 +282,7 @@ def test_a_frame_that_explodes_is_repeated_before_its_buffers_grow(looks, monkey
         return call
 
     monkeypatch.setattr(step_bounds, "raised", remember("repeat", raised))
-    monkeypatch.setattr(stepper, "overlaps", lambda *_: False)
+    monkeypatch.setattr(overlap, "overlaps", lambda *_: np.zeros(1, dtype=bool))
     monkeypatch.setattr(Buffers, "replace", remember("grow", replaced))
     looks(sim, 1000, lambda found: (100.0 * found[0], found[1]))  # as if it had exploded
     assert done[0] == "repeat" and "grow" in done

@@ -132,7 +132,7 @@ def test_new_pairs_are_looked_at_at_once(stages):
     for x, found in ((state.x, False), (ahead, True)):
         work.broad_phase.stale.fill_(1)
         broad_phase.refresh(model, x, ahead, work)
-        narrow_phase.find_inner_vertices(model, x, x, work)
+        narrow_phase.find_vertices(model, x, x, work)
         assert (work.contacts.n_vertex.numpy()[0] > 0) == found
 
 

@@ -172,7 +172,7 @@ def test_edges_that_come_nearer_in_small_steps_are_found_in_time(rng, stages, tu
     narrow_phase.clear_places(work)
     found = []
     for by in np.arange(0.0, 1.6, 0.1) * DEPTH:
-        narrow_phase.find_inner_edges(model, start, lowered(by), work)
+        narrow_phase.find_edges(model, start, lowered(by), work)
         found.append(int(work.narrow_phase.n_crossing.numpy()[0]))
     assert found[:10] == [0] * 10 and found[11:] == [2] * 5
     # New pairs are looked at at once, however far apart those before them were.
@@ -181,7 +181,7 @@ def test_edges_that_come_nearer_in_small_steps_are_found_in_time(rng, stages, tu
         x = lowered(by * DEPTH)
         broad_phase.refresh(model, x, lowered(2.0 * DEPTH), work)
         narrow_phase.clear_places(work)
-        narrow_phase.find_inner_edges(model, x, x, work)
+        narrow_phase.find_edges(model, x, x, work)
         assert work.narrow_phase.n_crossing.numpy()[0] == crossings
 
 

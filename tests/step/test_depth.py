@@ -7,8 +7,8 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, TetMesh, box, sphere
-from warp_contact.scene.scene import rotation_matrix
 from warp_contact.kernels.narrow_phase import shallow
+from warp_contact.scene.scene import rotation_matrix
 from warp_contact.step import depth, narrow_phase
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)

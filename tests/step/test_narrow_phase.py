@@ -13,7 +13,7 @@ RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 def found(model, state, work) -> list[tuple[int, int]]:
     """Vertices and the bodies that they lie in, as listed."""
     broad_phase.refresh(model, state.x, state.x, work)
-    narrow_phase.find_inner_vertices(model, state.x, state.x, work)
+    narrow_phase.find_vertices(model, state.x, state.x, work)
     inside = work.narrow_phase.penetration.numpy()[: work.contacts.n_vertex.numpy()[0]]
     return list(zip(inside["vert"].tolist(), inside["body"].tolist(), strict=True))
 
@@ -63,7 +63,7 @@ def test_a_body_near_very_many_others_misses_none(rng, stages, jittered, turned,
     sure, doubtful = brute_force(scene, state.x.numpy().astype(float))
     assert sure and sure <= pairs <= sure | doubtful
     narrow_phase.clear_places(work)
-    narrow_phase.find_inner_edges(model, state.x, state.x, work)
+    narrow_phase.find_edges(model, state.x, state.x, work)
     assert work.narrow_phase.n_crossing.numpy()[0] > 0
 
 

@@ -14,7 +14,7 @@ def region(scene: Scene, stages, find_contacts, records, edges: bool = False) ->
     model, state, work = stages(scene)
     find_contacts(model, work, state.x, edges=edges)
     residual.find_gaps(model, state.x, work)
-    search.begin(model, state.x, work)
+    search.begin(model, state.x, work, work.surface.open)
     return model, work, records(work)
 
 

@@ -4,6 +4,7 @@ from collections import defaultdict
 from statistics import mean, median
 from typing import NamedTuple
 
+import numpy as np
 import warp as wp
 
 from clock.timer import StageTimer, arrays, held, milliseconds
@@ -85,7 +86,8 @@ class _Window:
         self._steps, self._work, self._device = steps, stepper.work, sim.device
         self._work.dt.assign(stepper.last_dt)
         self._work.overflow.all.zero_()
-        self.step = step_of(sim.response, bool(stepper.last.overlapping))
+        self._work.worlds.apart.assign((stepper.last.overlapping < 1).astype(np.int32))
+        self.step = step_of(sim.response, bool((stepper.last.overlapping > 0).any()))
         last = stepper.last
         given = last.rates[1], last.dt, stepper.worlds.of_vert, last.dt
         stages = prepare(self._work.damping, *given)

@@ -58,7 +58,7 @@ def found(way: str, law, poisson: float, cells, ratio: float) -> wc.Simulation:
         if not work.surface.any_open.numpy()[0]:
             break
         if way == "balanced":
-            surface.resolve_overlaps(model, state, work, tries)
+            surface.close_gaps(model, state, work, tries)
         else:
             search.bisect(model, state.x, work, tries)
     return sim

@@ -4,6 +4,7 @@ import numpy as np
 import warp as wp
 
 from warp_contact.data.model import Model
+from warp_contact.data.surface import Surface
 from warp_contact.kernels.lengths import NEGLIGIBLE
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.mobility import Mobility
@@ -39,16 +40,19 @@ def n_world(model: Model) -> int:
     return len(np.unique(model.body_world.numpy()))
 
 
-def worlds_of(model: Model, is_open: wp.array, has_new: wp.array) -> Worlds:
-    """What a step knows of each world; ``is_open`` and ``has_new`` as in ``Worlds``, (n_world,)."""
+def worlds_of(model: Model, surface: Surface, has_new: wp.array) -> Worlds:
+    """What a step knows of each world; bodies may overlap. ``has_new`` as in ``Worlds``."""
     of_body, shortest = _shortest_edges(model)
     of_vert = of_body[model.vert_body.numpy()].astype(np.int32)
     worlds = Worlds()
     worlds.of_vert = wp.array(of_vert, dtype=int)
     worlds.negligible = wp.array(NEGLIGIBLE * shortest, dtype=float)
-    worlds.doing, worlds.asking = (wp.zeros(len(shortest), dtype=int) for _ in range(2))
+    worlds.apart, worlds.doing, worlds.asking = (
+        wp.zeros(len(shortest), dtype=int) for _ in range(3)
+    )
     worlds.sweep = wp.zeros(1, dtype=int)
-    worlds.open, worlds.has_new = is_open, has_new
+    worlds.open, worlds.old, worlds.was_old = surface.open, surface.old, surface.was_old
+    worlds.has_new = has_new
     return worlds
 
 

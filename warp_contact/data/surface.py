@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warp_contact.kernels.surface.residual import OLD, OPEN, WAS_OLD, WORLDS
+from warp_contact.kernels.surface.residual import OLD, OPEN, WORLDS
 
 
 @dataclass
@@ -12,13 +12,14 @@ class Surface:
     """Residual overlaps after the impulses, and the search for the common surface.
 
     Attributes:
-        found: the four below, shape (3 + n_world,)
-        of_looks: all of them but ``was_old``: those of a step, shape (2 + n_world,)
+        found: the five below, shape (2 + 3 n_world,)
+        of_looks: all of them but ``was_old``: those of a step, shape (2 + 2 n_world,)
         of_look: the next two, which are those of a look, shape (2,)
         any_open: whether some overlap is to be closed, shape (1,)
         any_old: whether some is for the search, being older than the step, shape (1,)
-        was_old: whether there was any for the search since the frame began, shape (1,)
         open: the last look that found an overlap to be closed, of each world, shape (n_world,)
+        old: whether some is for the search, in each world, shape (n_world,)
+        was_old: whether there was any for the search since the frame began, shape (n_world,)
         residual: residual overlap, 0 up to a tolerance [m], shape (contacts,)
         slack: part of it that later steps close [m], shape (contacts,)
         push: of the closure [kg m], shape (contacts,)
@@ -38,8 +39,9 @@ class Surface:
     of_look: wp.array[int]
     any_open: wp.array[int]
     any_old: wp.array[int]
-    was_old: wp.array[int]
     open: wp.array[int]
+    old: wp.array[int]
+    was_old: wp.array[int]
     residual: wp.array[float]
     slack: wp.array[float]
     push: wp.array[float]
@@ -58,15 +60,17 @@ class Surface:
 
 def allocate(n_world: int, n_body: int, n_vert: int, n_tet: int, n_contact: int) -> Surface:
     """Allocate without any overlap."""
-    found = wp.zeros(int(WORLDS) + n_world, dtype=int)
+    found = wp.zeros(int(WORLDS) + 3 * n_world, dtype=int)
+    of_worlds = found[int(WORLDS) :]
     return Surface(
         found=found,
-        of_looks=found[int(OPEN) :],
-        of_look=found[int(OPEN) : int(WORLDS)],
+        of_looks=found[: int(WORLDS) + 2 * n_world],
+        of_look=found[: int(WORLDS)],
         any_open=found[int(OPEN) : int(OPEN) + 1],
         any_old=found[int(OLD) : int(OLD) + 1],
-        was_old=found[int(WAS_OLD) : int(WAS_OLD) + 1],
-        open=found[int(WORLDS) :],
+        open=of_worlds[:n_world],
+        old=of_worlds[n_world : 2 * n_world],
+        was_old=of_worlds[2 * n_world :],
         residual=wp.zeros(n_contact, dtype=float),
         slack=wp.zeros(n_contact, dtype=float),
         push=wp.zeros(n_contact, dtype=float),

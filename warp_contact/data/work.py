@@ -109,7 +109,7 @@ def allocate_work(
         awake=awake,
         mesh=mesh_of(model, broad.surface),
         mobility=mobility_of(model, rows=shapes is not None),
-        worlds=worlds_of(model, of_surface.open, narrow.has_new),
+        worlds=worlds_of(model, of_surface, narrow.has_new),
         scan=scan.allocate(
             max(2 * n + 2, model.n_edge + 1, capacity.verts + 1, capacity.edges + 1)
         ),

@@ -6,7 +6,28 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work, everything
-from warp_contact.step.velocity import shift_velocities
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.step.velocity import answer_of, shift_velocities, velocities_now
+
+
+def velocities(
+    model: Model,
+    state: State,
+    work: Work,
+    dt: np.ndarray,
+    response: ContactSurface | Penalty | PredictedForce,
+    apart: np.ndarray,
+) -> np.ndarray:
+    """Velocities [m/s] at the time of the positions, shape (n_vert, 3).
+
+    ``dt`` is the last step of each vertex [s]; those ``apart``, a mask, are of worlds where nothing
+    overlaps. Contacts answer differently there, so that they are found for each kind of world.
+    """
+    out = np.empty((model.n_vert, 3), dtype=np.float32)
+    for one in np.unique(apart).tolist():
+        now = velocities_now(model, state, work, dt, answer_of(response, one)).numpy()
+        out[apart == one] = now[apart == one]
+    return out
 
 
 def set_velocities(

@@ -7,10 +7,9 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 
 
-def lost_vertex(state: State) -> int | None:
-    """The first vertex whose position or velocity is not finite."""
-    finite = np.isfinite(state.x.numpy()).all(1) & np.isfinite(state.v.numpy()).all(1)
-    return None if finite.all() else int((~finite).argmax())
+def finite_vertices(state: State) -> np.ndarray:
+    """Whether position and velocity of each vertex are finite, shape (n_vert,)."""
+    return np.isfinite(state.x.numpy()).all(axis=1) & np.isfinite(state.v.numpy()).all(axis=1)
 
 
 def vertex_name(model: Model, vertex: int) -> str:

@@ -44,10 +44,13 @@ class FrameStart:
         """Keep the damping as it is for the length of the steps, for worlds that begin later."""
         damping.keep(self._scaled, work.damping)
 
-    def recall(self, work: Work, verts: np.ndarray, edges: np.ndarray) -> None:
-        """Restore what vertices and edges, masks, take over from the last frame."""
+    def recall(self, work: Work, verts: np.ndarray, edges: np.ndarray, begins: bool) -> None:
+        """Restore what vertices and edges, masks, take over from the last frame.
+
+        For those of which the frame ``begins`` now, or for those without a step in it.
+        """
         warm_start.recall(work.warm, self._warm, verts, edges, work.overflow.contacts)
-        damping.recall(work.damping, self._scaled, verts)
+        damping.recall(work.damping, self._scaled if begins else self._damping, verts)
 
     def undo(self, state: State, work: Work) -> None:
         """Restore all, as if the frame had not begun."""

@@ -13,15 +13,16 @@ class LastFrame:
         n: steps, 0 before the first frame, shape (n_world,)
         dt: their length [s], 0 before the first; the velocities of symplectic Euler are those of
             half of it before the positions, shape (n_world,)
+        overlapping: 1 where there may be overlaps that no step created, 0 where there are none,
+            -1 where it is to be found, shape (n_world,)
         rates: largest elastic frequency and damping rate at its end [1/s], None if to be found,
             shape (2, n_world)
-        overlapping: whether there may be overlaps that no step created, None if to be found
     """
 
     n: np.ndarray
     dt: np.ndarray
+    overlapping: np.ndarray
     rates: np.ndarray | None = None
-    overlapping: bool | None = None
 
     def values(self) -> dict[str, np.ndarray]:
         """What a checkpoint needs; what is to be found is left out."""
@@ -30,10 +31,9 @@ class LastFrame:
 
 def none_yet(n_world: int) -> LastFrame:
     """Before the first frame."""
-    return LastFrame(np.zeros(n_world, dtype=int), np.zeros(n_world))
+    return LastFrame(np.zeros(n_world, dtype=int), np.zeros(n_world), np.full(n_world, -1))
 
 
 def last_frame_of(values: dict[str, np.ndarray]) -> LastFrame:
     """The instance that gave these ``values``."""
-    overlapping = bool(values["overlapping"]) if "overlapping" in values else None
-    return LastFrame(values["n"], values["dt"], values.get("rates"), overlapping)
+    return LastFrame(values["n"], values["dt"], values["overlapping"], values.get("rates"))

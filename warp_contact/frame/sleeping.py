@@ -16,31 +16,29 @@ import warp as wp
 
 from warp_contact.data import boxes
 from warp_contact.data.model import Model
-from warp_contact.data.state import Awake, State
+from warp_contact.data.state import State
 from warp_contact.data.work import Work
+from warp_contact.frame.turns import Turns
 from warp_contact.kernels.motion import sleeping as kernels
 
 REST_TIME = 0.5  # s that a body has to be at rest before it may sleep
 
 
 class Sleeping:
-    """Knows for how long each body has been at rest; its ``awake`` says which bodies move."""
+    """Knows for how long each body has been at rest; ``turns`` lets those sleep that it says."""
 
-    def __init__(self, model: Model, state: State, fps: float):
+    def __init__(self, model: Model, state: State, fps: float, turns: Turns):
         """Everything is awake; frames come ``fps`` times a second."""
-        self.model = model
-        self.awake = Awake(
-            bodies=wp.full(model.n_body, 1, dtype=int),
-            tets=wp.full(model.n_tet, 1, dtype=int),
-            inv_mass=wp.clone(model.inv_mass),
-        )
+        self.model, self.awake, self._turns = model, turns.awake, turns
         self._time = 1.0 / fps
         self._wanted = max(2, math.ceil(REST_TIME * fps))
         self._anchor = wp.clone(state.x)
         self._frames = wp.zeros(model.n_body, dtype=int)
-        self._moved, self._mobile = (wp.zeros(model.n_body, dtype=int) for _ in range(2))
+        self._moved, self._world, self._idle = (wp.zeros(model.n_body, dtype=int) for _ in range(3))
+        free = np.bincount(model.vert_body.numpy(), model.inv_mass.numpy() > 0.0, model.n_body)
+        self._mobile = wp.array(free > 0, dtype=int)
         self._reach = wp.zeros(model.n_body, dtype=float)
-        self._speed = wp.zeros(1, dtype=float)
+        self._speed = wp.zeros(turns.worlds.n, dtype=float)
         self._again = wp.zeros(1, dtype=int)
         self._before = np.ones(model.n_body, dtype=np.int32)  # awake in the last frame
 
@@ -75,7 +73,7 @@ class Sleeping:
 
     def save(self) -> None:
         """Keep what ``update`` changes."""
-        arrays = self._anchor, self._frames, self.awake.bodies, self.awake.tets, self.awake.inv_mass
+        arrays = self._anchor, self._frames, self.awake.bodies, self.awake.inv_mass
         self._saved = [(array, wp.clone(array)) for array in arrays]
         self._saved_before = self._before
 
@@ -84,29 +82,54 @@ class Sleeping:
         for array, kept in self._saved:
             wp.copy(array, kept)
         self._before = self._saved_before
+        self._turns.sleep(self._before)
 
     def wake(self, body: int) -> None:
         """Wake a body: its rest begins again."""
         self._frames[body : body + 1].zero_()
 
-    def wake_all(self, work: Work) -> None:
-        """Wake all bodies: they are awake in the next frame, and their rest begins again."""
-        self._frames.zero_()
-        self.awake.bodies.fill_(1)
-        self._before = np.ones(self.model.n_body, dtype=np.int32)
+    def wake_all(self, of: np.ndarray, work: Work) -> None:
+        """Wake all bodies of worlds, a mask: in the next frame they are awake and begin to rest."""
+        own = of[self._turns.worlds.of_body]
+        self._frames.assign(np.where(own, 0, self._frames.numpy()).astype(np.int32))
+        self._before = np.where(own, 1, self._before).astype(np.int32)
+        self.awake.bodies.assign(self._before)
         self._pause(work)
 
-    def update(self, state: State, work: Work) -> bool:
-        """Before a frame: decide which bodies sleep. False when all do."""
-        model, awake = self.model, self.awake
-        for array in (self._moved, self._mobile, self._speed):
-            array.zero_()
+    def update(self, state: State, work: Work, of: np.ndarray) -> bool:
+        """Before a frame: decide which bodies of worlds, a mask, sleep.
+
+        Where all bodies of the scene do, stop everything, and return False.
+        """
+        self._count_rest(state, of)
+        bodies = self.awake.bodies.numpy()
+        if bodies.all() and self._before.all():
+            return True
+        broad = work.broad_phase
+        boxes.of_bodies(self.model, state.x, self._reach, broad.lower, broad.upper)
+        broad.bodies.rebuild()
+        self._again.fill_(1)
+        wp.capture_while(self._again, lambda: self._wake(work))
+        bodies = self.awake.bodies.numpy()
+        if (bodies != self._before).any():
+            self._before = bodies.copy()
+            self._pause(work)
+        if not bodies.any():
+            self._skip_frame(state, work)
+        return bool(bodies.any())
+
+    def _count_rest(self, state: State, of: np.ndarray) -> None:
+        """Count for how long bodies of worlds, a mask, have been at rest: the others are awake."""
+        model, of_body = self.model, self._turns.worlds.of_body
+        self._world.assign(np.where(of[of_body], of_body, -1).astype(np.int32))
+        self._moved.zero_()
+        self._speed.zero_()
         wp.launch(
             kernels.watch,
             dim=model.n_vert,
-            inputs=[self._time, model.vert_body, model.body_edge, model.inv_mass, self._anchor]
-            + [state.x, state.v],
-            outputs=[self._moved, self._speed, self._mobile],
+            inputs=[self._time, model.vert_body, self._world, model.body_edge, model.inv_mass]
+            + [self._anchor, state.x, state.v],
+            outputs=[self._moved, self._speed],
         )
         wp.launch(
             kernels.begin_rest,
@@ -118,31 +141,14 @@ class Sleeping:
         wp.launch(
             kernels.count_rest,
             dim=model.n_body,
-            inputs=[self._wanted, self._time, gravity, model.body_edge, self._moved, self._speed],
-            outputs=[self._frames, awake.bodies, self._reach],
+            inputs=[self._wanted, self._time, gravity, self._world, model.body_edge, self._moved]
+            + [self._speed],
+            outputs=[self._frames, self.awake.bodies, self._reach],
         )
-        bodies = awake.bodies.numpy()
-        if bodies.all() and self._before.all():
-            return True
-        broad = work.broad_phase
-        boxes.of_bodies(model, state.x, self._reach, broad.lower, broad.upper)
-        broad.bodies.rebuild()
-        self._again.fill_(1)
-        wp.capture_while(self._again, lambda: self._wake(work))
-        bodies = awake.bodies.numpy()
-        if (bodies != self._before).any():
-            self._before = bodies.copy()
-            self._pause(work)
-        return bool(bodies.any())
 
     def _pause(self, work: Work) -> None:
-        """Mark the tets of bodies awake, and have the pairs found again."""
-        wp.launch(
-            kernels.pause_tets,
-            dim=self.model.n_tet,
-            inputs=[self.model.tet_body, self.awake.bodies],
-            outputs=[self.awake.tets],
-        )
+        """Let bodies sleep, and have the pairs found again."""
+        self._turns.sleep(self._before)
         work.broad_phase.stale.fill_(1)
 
     def _wake(self, work: Work) -> None:
@@ -155,8 +161,7 @@ class Sleeping:
             outputs=[self.awake.bodies, self._again],
         )
 
-    def skip_frame(self, state: State, work: Work) -> None:
-        """Stop everything."""
+    def _skip_frame(self, state: State, work: Work) -> None:
         state.v.zero_()
         self.awake.inv_mass.zero_()
         work.contacts.n.zero_()
@@ -164,10 +169,11 @@ class Sleeping:
     def begin_frame(self, state: State, work: Work) -> None:
         """Stop sleeping bodies, and forget the contact forces of all others."""
         model, awake = self.model, self.awake
+        self._idle.assign(self._turns.idle[self._turns.worlds.of_body].astype(np.int32))
         wp.launch(
             kernels.pause_vertices,
             dim=model.n_vert,
-            inputs=[model.vert_body, model.inv_mass, awake.bodies],
+            inputs=[model.vert_body, model.inv_mass, awake.bodies, self._idle],
             outputs=[awake.inv_mass, state.v, work.forces.received],
         )
         wp.launch(

@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 
 from warp_contact.data.model import Model
+from warp_contact.frame.krylov import ritz_pairs, start_vectors
 from warp_contact.frame.worlds import Worlds
 from warp_contact.kernels.elastic import neo_hookean, shape
 from warp_contact.kernels.motion import lanczos
@@ -16,12 +17,10 @@ SHORT = 4  # in later calls
 CHUNK = 64  # vertices summed by one thread
 FIRST, LATER = (3, 8), (1, 2)  # fewest and most restarts in the first call, in later calls
 NOISE = 0.1  # random part of a restart, so that a mode elsewhere can appear
-SECOND = 0.3  # part of the second mode in a restart, so that it can overtake
 CONVERGED = 0.02  # gap between estimate and bound at which restarts end, relative to lambda
 LITTLE = 0.01  # change of shape, see elastic/shape.py, that moves a rate by some percent at most
 MUCH = 0.2  # change that makes a frequency at most SLOWER times as large, a damping its square
 SLOWER = 4.0
-SEED = 20051125
 
 
 class Spectrum:
@@ -43,14 +42,14 @@ class Spectrum:
             times in a few steps, shape (n_world,)
     """
 
-    def __init__(self, model: Model, worlds: Worlds | None = None, implicit: bool = False) -> None:
+    def __init__(self, model: Model, worlds: Worlds | None = None, implicit: bool = False):
         """Allocate about 160 bytes per vertex and 84 per tet on the current device.
 
         ``worlds`` are those that do not depend on each other; without them all bodies are one.
         ``implicit`` steps are not limited by any rate: none is looked for.
         """
         self._implicit = implicit
-        self._model, self._worlds = model, worlds or Worlds(model, apart=False)
+        self._model, self.worlds = model, worlds or Worlds(model, apart=False)
         chunk, body_chunk = _chunks(model.body_vert.numpy())
         self._chunk = wp.array(chunk, dtype=int)
         self._body_chunk = wp.array(body_chunk, dtype=int)
@@ -60,13 +59,12 @@ class Spectrum:
         self._basis = wp.zeros((DEPTH + 1, model.n_vert), dtype=wp.vec3)
         self._f_tet = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
         self._x = wp.empty(model.n_vert, dtype=wp.vec3)
-        noise = np.random.default_rng(SEED).standard_normal((model.n_vert, 3))
-        self._noise = wp.array(_unit(noise, model), dtype=wp.vec3)
+        self._noise = wp.array(start_vectors(model, self.worlds), dtype=wp.vec3)
         self._start: dict[Callable, wp.array] = {}
         self._graph: dict[tuple[Callable, int], wp.Graph] = {}
         self._before = wp.zeros(model.n_tet, dtype=wp.mat33)
         self._change = wp.empty((2, model.n_body), dtype=float)
-        self.flat = np.zeros(self._worlds.n, dtype=bool)
+        self.flat = np.zeros(self.worlds.n, dtype=bool)
         self._at: np.ndarray | None = None
         self._of_bodies = np.zeros((2, model.n_body))
 
@@ -79,20 +77,20 @@ class Spectrum:
         at; None for all.
         """
         if self._implicit:
-            return np.zeros((2, self._worlds.n))
-        of = np.ones(self._worlds.n, dtype=bool) if of is None else of
+            return np.zeros((2, self.worlds.n))
+        of = np.ones(self.worlds.n, dtype=bool) if of is None else of
         change, flat = self._changes(x)
-        self.flat = np.where(of, self._worlds.most(flat) > 0.0, self.flat)
+        self.flat = np.where(of, self.worlds.most(flat) > 0.0, self.flat)
         stale = of if self._at is None else of & self._stale(change)
         if stale.any():
-            own = stale[self._worlds.of_vert, None]
+            own = stale[self.worlds.of_vert, None]
             at = x.numpy().copy()
             self._at = at if self._at is None else np.where(own, at, self._at)
             self._remember(wp.array(self._at, dtype=wp.vec3))
             squares = self._bounds(forces.apply_stiffness, x, stale)
             found = squares**0.5, self._damping_rates(x, stale)
-            self._of_bodies = np.where(stale[self._worlds.of_body], found, self._of_bodies)
-        return self._worlds.most(self._of_bodies)
+            self._of_bodies = np.where(stale[self.worlds.of_body], found, self._of_bodies)
+        return self.worlds.most(self._of_bodies)
 
     def _remember(self, x: wp.array) -> None:
         """Keep the shapes at ``x`` [m]."""
@@ -109,7 +107,7 @@ class Spectrum:
 
     def _stale(self, change: np.ndarray) -> np.ndarray:
         """Worlds whose rates do not suffice after such changes of bodies, shape (n_body,)."""
-        worlds = self._worlds
+        worlds = self.worlds
         most = worlds.most(self._of_bodies)
         slow = (self._of_bodies * [[SLOWER], [SLOWER**2]] <= most[:, worlds.of_body]).all(axis=0)
         late = ~(change <= np.where(slow, MUCH, LITTLE))
@@ -141,10 +139,10 @@ class Spectrum:
         """Put back what was kept in the ``memory``, which is used up; of some worlds, or of all."""
         if of is not None and not of.all():
             starts, at, of_bodies, flat = memory
-            own = of[self._worlds.of_vert, None]
+            own = of[self.worlds.of_vert, None]
             for apply, start in starts.items():
                 start.assign(np.where(own, start.numpy(), self._start[apply].numpy()))
-            of_bodies = np.where(of[self._worlds.of_body], of_bodies, self._of_bodies)
+            of_bodies = np.where(of[self.worlds.of_body], of_bodies, self._of_bodies)
             memory = starts, np.where(own, at, self._at), of_bodies, np.where(of, flat, self.flat)
         self._start, self._at, self._of_bodies, self.flat = memory
         if self._at is not None:
@@ -169,7 +167,7 @@ class Spectrum:
         if self._at is not None:
             self._remember(wp.array(self._at, dtype=wp.vec3))
         self._of_bodies = starts.get("of_bodies", self._of_bodies)
-        self.flat = starts.get("flat", np.zeros(self._worlds.n, dtype=bool))
+        self.flat = starts.get("flat", np.zeros(self.worlds.n, dtype=bool))
 
     def _damping_rates(self, x: wp.array, of: np.ndarray | None = None) -> np.ndarray:
         """Bounds on the eigenvalues [1/s] of M^-1 C of each body, as ``_bounds``."""
@@ -183,43 +181,58 @@ class Spectrum:
     def _bounds(self, apply: Callable, x: wp.array, of: np.ndarray | None = None) -> np.ndarray:
         """Bounds on the eigenvalues of each body, shape (n_body,).
 
-        Only those of the worlds ``of`` count, shape (n_world,), all without it. Each world ends
-        where it has converged, whatever the others do.
+        Only those of the worlds ``of`` count, shape (n_world,), all without it. A world without a
+        start, before its first call and where it was lost in the last one, begins with noise.
         """
-        worlds = self._worlds
-        going = np.ones(worlds.n, dtype=bool) if of is None else of.copy()
+        worlds = self.worlds
+        of = np.ones(worlds.n, dtype=bool) if of is None else of
+        if apply not in self._start:
+            self._start[apply] = wp.full(self._model.n_vert, wp.vec3(np.nan), dtype=wp.vec3)
+        start = self._start[apply].numpy().copy()
+        none = np.isnan(start)
+        begin = wp.array(np.where(none, self._noise.numpy(), start), dtype=wp.vec3)
+        first = np.bincount(worlds.of_vert, none[:, 0], worlds.n) > 0
         wp.copy(self._x, x)
-        first = apply not in self._start
-        if first:
-            self._start[apply] = wp.clone(self._noise)
-        wp.copy(self._basis[0], self._start[apply])
-        fewest, most = FIRST if first else LATER
-        depth = DEPTH if first else SHORT
-        out, start = np.zeros(self._model.n_body), None
+        out = np.zeros(self._model.n_body)
+        for own, *how in ((of & first, DEPTH, *FIRST), (of & ~first, SHORT, *LATER)):
+            if own.any():
+                wp.copy(self._basis[0], begin)
+                bounds, ends = self._converge(apply, own, *how)
+                out = np.where(own[worlds.of_body], bounds, out)
+                start = np.where(own[worlds.of_vert, None], ends, start)
+        self._start[apply].assign(start)
+        return out
+
+    def _converge(
+        self, apply: Callable, of: np.ndarray, depth: int, fewest: int, most: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds on the eigenvalues of bodies in the worlds ``of``, and where later calls start.
+
+        Each world ends where it has converged, whatever the others do. One that is not finite has
+        infinite bounds, and no start.
+        """
+        worlds, going = self.worlds, of.copy()
+        out = np.zeros(self._model.n_body)
+        ends = np.full((self._model.n_vert, 3), np.nan, dtype=np.float32)
         for cycle in range(most):
             self._cycle(apply, depth)
             coef = self._coef.numpy()[: 2 * depth + 1]
-            if not np.isfinite(coef).all():
-                del self._start[apply]
-                return np.full(self._model.n_body, np.inf)
-            theta, residual, ritz = _ritz_pairs(coef)
+            lost = ~np.isfinite(coef).all(axis=0)
+            theta, residual, ritz = ritz_pairs(np.where(lost, 0.0, coef))
             self._restart(ritz)
             bound = theta + residual
             done = worlds.most(bound) <= (1.0 + CONVERGED) * worlds.most(theta)
-            ended = going & (done if cycle + 1 >= fewest else False)
-            ended = going if cycle + 1 == most else ended
-            out = np.where(ended[worlds.of_body], bound, out)
-            if ended.all():  # the usual case: one world, or all at once
-                wp.copy(self._start[apply], self._basis[0])
-                return out
-            if ended.any():
-                start = self._start[apply].numpy() if start is None else start
-                start = np.where(ended[worlds.of_vert, None], self._basis[0].numpy(), start)
+            done = done & (cycle + 1 >= fewest) | (cycle + 1 == most)
+            gone = worlds.most(lost.astype(float)) > 0.0
+            ended = going & (done | gone)
+            out = np.where(ended[worlds.of_body], np.where(lost, np.inf, bound), out)
+            if (ended & ~gone).any():
+                own = (ended & ~gone)[worlds.of_vert, None]
+                ends = np.where(own, self._basis[0].numpy(), ends)
             going &= ~ended
             if not going.any():
                 break
-        self._start[apply].assign(start)
-        return out
+        return out, ends
 
     def _restart(self, ritz: np.ndarray) -> None:
         """Set row 0 of the basis to a sum of its rows for each body, plus noise."""
@@ -274,26 +287,3 @@ def _chunks(body_vert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     within = np.arange(body_chunk[-1]) - np.repeat(body_chunk[:-1], count)
     first = np.repeat(body_vert[:-1], count) + CHUNK * within
     return np.append(first, body_vert[-1]), body_chunk
-
-
-def _unit(u: np.ndarray, model: Model) -> np.ndarray:
-    """Give the part of ``u`` on the free vertices of each body the mass norm 1."""
-    u = np.where(model.inv_mass.numpy()[:, None] > 0.0, u, 0.0)
-    body = model.vert_body.numpy()
-    norm2 = np.bincount(body, model.mass.numpy() * (u * u).sum(axis=1), minlength=model.n_body)
-    return u / np.sqrt(np.where(norm2 > 0.0, norm2, 1.0))[body, None]
-
-
-def _ritz_pairs(coef: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest |Ritz value| of each body, its residual norm, and how to restart in the basis."""
-    a, b = coef[1::2].T, np.sqrt(coef[2::2]).T  # (n_body, depth)
-    t = np.zeros((*a.shape, a.shape[1]))
-    k = np.arange(a.shape[1])
-    t[:, k, k] = a
-    t[:, k[1:], k[:-1]] = b[:, :-1]
-    value, vector = np.linalg.eigh(t)
-    order = np.argsort(-np.abs(value), axis=1)
-    body = np.arange(len(t))
-    first, second = vector[body, :, order[:, 0]], vector[body, :, order[:, 1]]
-    residual = b[:, -1] * np.abs(first[:, -1])
-    return np.abs(value[body, order[:, 0]]), residual, first + SECOND * second

@@ -39,10 +39,10 @@ LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.6
 KEEP = 0.9
 
 
-def steps_per_second(omega, speed, thickness, edge, overlaps: bool):
+def steps_per_second(omega, speed, thickness, edge, overlaps):
     """Steps [1/s] that are stable, and short against the thinnest body and the edges.
 
-    All but the last may be arrays, of one value a world.
+    All may be arrays, of one value a world.
 
     Args:
         omega: largest frequency [1/s]
@@ -53,7 +53,7 @@ def steps_per_second(omega, speed, thickness, edge, overlaps: bool):
     """
     stable = omega / (2.0 * SAFETY)
     passing = speed / (REACH * thickness)
-    travel = LINGERING if overlaps else TRAVEL
+    travel = np.where(overlaps, LINGERING, TRAVEL)
     gentle = np.minimum(speed / (travel * edge), PATIENCE * stable)
     return np.maximum(np.maximum(stable, passing), gentle)
 
@@ -115,6 +115,23 @@ def raised(before, after, dt, least: float = RAISED):
     fast = np.minimum(after[1], EXPLODED**2 * np.maximum(before[1], 1.0 / dt))
     slow = np.maximum(least * before[0], after[0])
     return np.minimum(slow, most), np.maximum(before[1], fast)
+
+
+def explodes(before, after, dt):
+    """Whether the rates ``after`` are above what ``raised`` takes for true, or infinite."""
+    fast = after[0] > EXPLODED * np.maximum(before[0], served(dt))
+    return fast | (after[1] > EXPLODED**2 * np.maximum(before[1], 1.0 / dt))
+
+
+def repeated(before, after, dt, in_parts):
+    """Frequency and damping rate [1/s] for the repeat of a frame: as ``raised``.
+
+    A step that was looked at ``in_parts`` failed before the end of its frame. Where a world is lost
+    ``after`` it, it takes twice as many.
+    """
+    higher = raised(before, after, dt, np.where(in_parts, CUT_SHORT, RAISED))
+    doubled = 2.0 * np.stack([np.maximum(before[0], served(dt)), before[1]])
+    return np.where(np.isfinite(after).all(axis=0), higher, doubled)
 
 
 def fault(dt: float, omega: float, speed: float, thickness: float) -> str:

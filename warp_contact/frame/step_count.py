@@ -67,7 +67,7 @@ class StepCount:
         if self.wanted:
             return np.full(self._worlds.n, self.wanted)
         omega, speed = self._with_response(omega), self._speed(state)
-        sizes, overlaps = (self._thickness, self._edge), last.overlapping or self._leaves
+        sizes, overlaps = (self._thickness, self._edge), (last.overlapping > 0) | self._leaves
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
         if self._implicit:

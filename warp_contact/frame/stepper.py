@@ -15,10 +15,10 @@ from warp_contact.frame import between, step_bounds
 from warp_contact.frame.buffers import Buffers
 from warp_contact.frame.capacity import enlarged
 from warp_contact.frame.damping import prepare, stages_for
-from warp_contact.frame.diagnosis import lost_vertex, too_damped
+from warp_contact.frame.diagnosis import finite_vertices, too_damped
 from warp_contact.frame.frame_start import FrameStart
 from warp_contact.frame.last_frame import LastFrame, none_yet
-from warp_contact.frame.overlap import overlaps
+from warp_contact.frame.overlap import find_overlaps
 from warp_contact.frame.rates import rates_now
 from warp_contact.frame.sleeping import Sleeping
 from warp_contact.frame.spectrum import Spectrum
@@ -26,7 +26,7 @@ from warp_contact.frame.step_count import StepCount
 from warp_contact.frame.turns import Turns, segments
 from warp_contact.frame.worlds import Worlds
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
-from warp_contact.step.velocity import answer_of, shift_velocities, velocities_now
+from warp_contact.step.velocity import shift_velocities
 
 HALVED = 3  # times at most that a step is halved because state or stiffness is not finite
 PART = 8  # steps between two checks of the rates, in frames that begin or end with a flat tet
@@ -61,16 +61,15 @@ class Stepper:
         """Allocate what the steps need, on the current device."""
         self.fps, self.wanted = fps, wanted
         may_sleep = sleeping and any(model.gravity)  # else a slow body may be in free flight
-        self.worlds = Worlds(model, apart=not may_sleep)
+        self.worlds = Worlds(model)
         self.last = none_yet(self.worlds.n)
         self.first = state.x.numpy().copy(), state.v.numpy().copy()
         self._model, self._state = model, state
         self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, implicit)
         self.spectrum = Spectrum(model, self.worlds, implicit)
-        self.sleeping = Sleeping(model, state, fps) if may_sleep else None
-        self._turns = Turns(model, self.worlds) if self.worlds.n > 1 else None
-        awake = getattr(self.sleeping or self._turns, "awake", None)
-        self.buffers = Buffers(model, state, response, awake, self.worlds, implicit)
+        self._turns = Turns(model, self.worlds, may_sleep)
+        self.sleeping = Sleeping(model, state, fps, self._turns) if may_sleep else None
+        self.buffers = Buffers(model, state, response, self._turns.awake, self.worlds, implicit)
         self._start = FrameStart(state, self.work)
         self._cut, self._first_capacity = False, self.work.capacity
 
@@ -88,20 +87,20 @@ class Stepper:
         """
         self._begin()
         try:
-            if not self._all_sleep():
+            calm = self.last.overlapping == 0  # other worlds have to be searched
+            if not self.sleeping or self.sleeping.update(self._state, self.work, calm):
                 self._step(frame)
         except BaseException:
             self._undo()
             raise
 
     def _step(self, frame: int) -> None:
-        overlapping = self.last.overlapping
-        while overlapping is None or self.grow():
-            overlapping = overlaps(self._model, self._state, self.work)
-        self._overlapping = overlapping
+        given = self._model, self._state, self.buffers
+        self._overlapping = find_overlaps(*given, self.last.overlapping, self.grow)
         rates = self._find_step(frame)
-        old = overlapping and bool(self.work.surface.was_old.numpy()[0])
-        self.last = LastFrame(self._n, self._dt, rates, old)
+        old = self._overlapping & (self.work.surface.was_old.numpy() > 0)
+        n = np.where(self._turns.idle, self.last.n, self._n)
+        self.last = LastFrame(n, self._dt, old.astype(int), rates)
 
     def foresee(self, frame: int) -> int:
         """Steps that frame number ``frame`` will take if none proves too long."""
@@ -115,15 +114,6 @@ class Stepper:
         of_bodies = self.spectrum.of_bodies[0]
         return self._step_count.steps(self._state, of_bodies, rates[0], last, frame)
 
-    def _all_sleep(self) -> bool:
-        """Decide which bodies sleep; where all do, nothing moves in this frame."""
-        if not self.sleeping or self.last.overlapping is not False:  # it has to be searched
-            return False
-        if self.sleeping.update(self._state, self.work):
-            return False
-        self.sleeping.skip_frame(self._state, self.work)
-        return True
-
     def _find_step(self, frame: int) -> np.ndarray:
         """Step the frame until its steps fit; return the last rates [1/s], (2, n_world)."""
         rates = self._rates()
@@ -133,29 +123,26 @@ class Stepper:
         for _ in range(ATTEMPTS):
             kept = self.spectrum.memory()
             after, wrong = self._run(rates, frame, in_parts)
-            fits = self._fit(rates, after)
-            while not wrong and fits.all() and self.grow():
+            while not (wrong or self._explode(rates, after).any()) and self.grow():
                 self.spectrum.remind(kept)
                 kept = self.spectrum.memory()
                 after, wrong = self._run(rates, frame, in_parts)
-                fits = self._fit(rates, after)
-            self._cut = self._cut or enlarged(self.work) is not None  # what explodes never grows
-            flat = in_parts | bool(wrong) | self._flat()
+            full = enlarged(self.work) is not None  # what explodes never grows
+            self._cut = self._cut or full
+            counts = self._explode(rates, after) | (not full)  # worlds of which the frame tells
+            fits = self._fit(rates, after) | ~counts
+            flat = in_parts | (counts & (self._flat() | ~np.isfinite(after).all(axis=0)))
             again = flat & ~in_parts
             if not wrong and (fits & ~again).all():
                 return after
             self._start.go_back(self._state, self.work)
             if wrong:
-                if self.wanted or halved == HALVED or lost_vertex(self._state) is not None:
+                if self.wanted or halved == HALVED or not finite_vertices(self._state).all():
                     raise SimulationError(f"frame {frame}: {wrong} ({self._n.max()} substeps)")
                 halved += 1
-                served = np.maximum(rates[0], step_bounds.served(self._dt))
-                rates = 2.0 * np.stack([served, rates[1]])
-            else:
-                self.spectrum.remind(kept, fits & ~again)  # these take the same steps again
-                least = np.where(in_parts, step_bounds.CUT_SHORT, step_bounds.RAISED)
-                rates = np.where(fits, rates, step_bounds.raised(rates, after, self._dt, least))
-            in_parts = flat
+            self.spectrum.remind(kept, fits & ~again)  # these take the same steps again
+            higher = step_bounds.repeated(rates, after, self._dt, in_parts)
+            rates, in_parts = np.where(fits, rates, higher), flat
         stiffest = self._model.labels[int(self.spectrum.of_bodies[0].argmax())]
         raise SimulationError(f"frame {frame}: no step is stable, not for body '{stiffest}'")
 
@@ -167,6 +154,10 @@ class Stepper:
         """Worlds whose steps, chosen for ``rates`` [1/s], fit the rates ``after`` them."""
         damped = step_bounds.stays_damped(self._dt, rates[1], after[1])
         return damped if self.wanted else damped & step_bounds.stays_stable(self._dt, after[0])
+
+    def _explode(self, rates: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Those that do not fit at all, by ``step_bounds.explodes``."""
+        return ~self._fit(rates, after) & step_bounds.explodes(rates, after, self._dt)
 
     def velocities(self) -> np.ndarray:
         """Velocities [m/s] at the time of the positions, shape (n_vert, 3)."""
@@ -181,7 +172,7 @@ class Stepper:
             raise
         contacts.copy(self.work.contacts, found)
         contact_forces.copy(self.work.forces, forces)
-        return now.numpy()
+        return now
 
     def set_velocities(self, values: np.ndarray, at: np.ndarray, body: int) -> None:
         """Set ``values`` [m/s], shape (k, 3), at vertices ``at`` (k,) of a body."""
@@ -190,13 +181,18 @@ class Stepper:
         if self.sleeping:
             self.sleeping.wake(body)
 
-    def set_positions(self, x: np.ndarray) -> None:
-        """Set positions [m], shape (n_vert, 3); overlaps and rates are found before a frame."""
+    def set_positions(self, x: np.ndarray, at: slice) -> None:
+        """Set positions [m], shape (n_vert, 3), of vertices ``at``; others stay.
+
+        Before a frame, overlaps are found in worlds of these, and the rates.
+        """
         v = self.velocities()
         between.set_positions(self._model, self._state, self.work, self.last_dt, x, v)
-        self.last = replace(self.last, overlapping=None, rates=None)
+        overlapping = self.last.overlapping.copy()
+        overlapping[self.worlds.of_vert[at]] = -1
+        self.last = replace(self.last, overlapping=overlapping, rates=None)
         if self.sleeping:
-            self.sleeping.wake_all(self.work)
+            self.sleeping.wake_all(overlapping < 0, self.work)
 
     def reset(self) -> None:
         """Begin anew from the first positions and velocities."""
@@ -213,7 +209,7 @@ class Stepper:
         self.work.contacts.n.zero_()
         self.work.broad_phase.stale.fill_(1)
         if self.sleeping:
-            self.sleeping.wake_all(self.work)
+            self.sleeping.wake_all(self.last.overlapping < 0, self.work)
 
     def grow(self) -> bool:
         """Enlarge the buffers that the frame outgrew, and go back to its start; True if any."""
@@ -231,10 +227,11 @@ class Stepper:
         """The last step of each vertex [s], shape (n_vert,)."""
         return self.last.dt[self.worlds.of_vert]
 
-    def _velocities(self) -> wp.array:
+    def _velocities(self) -> np.ndarray:
         self.buffers.set_step(float(self.last.dt.max()))
-        answer = answer_of(self.buffers.response, self.last.overlapping is False)
-        return velocities_now(self._model, self._state, self.work, self.last_dt, answer)
+        apart = (self.last.overlapping == 0)[self.worlds.of_vert]
+        given = self.work, self.last_dt, self.buffers.response, apart
+        return between.velocities(self._model, self._state, *given)
 
     def _run(self, rates: np.ndarray, frame: int, in_parts: np.ndarray) -> tuple[np.ndarray, str]:
         """Step the frame for the rates given [1/s], shape (2, n_world).
@@ -243,15 +240,15 @@ class Stepper:
         ``in_parts`` no longer fit, or where buffers were too small.
         """
         work, of_vert = self.work, self.worlds.of_vert
-        if self._turns:
-            self._turns.let_all(work)
+        self._turns.let_all(work)
         if self.sleeping:
             self.sleeping.begin_frame(self._state, work)
         else:
             contact_forces.clear(work.forces)
-        now = replace(self.last, overlapping=self._overlapping)
-        self._n = self._steps(rates, now, frame)
-        self._dt = 1.0 / (self.fps * self._n)
+        now = replace(self.last, overlapping=self._overlapping.astype(int))
+        idle = self._turns.idle
+        self._n = np.where(idle, 0, self._steps(rates, now, frame))
+        self._dt = np.where(idle, self.last.dt, 1.0 / (self.fps * np.maximum(self._n, 1)))
         if work.damping and stages_for(rates[1], self._dt) > MOST:
             wrong = too_damped(self._model, self.spectrum.of_bodies[1], self._dt)
             raise SimulationError(f"frame {frame}: {wrong}")
@@ -262,19 +259,20 @@ class Stepper:
         work.dt.assign(self._dt[of_vert].astype(np.float32))
         work.overflow.all.zero_()
         work.surface.was_old.zero_()
+        work.worlds.apart.assign((~self._overlapping).astype(np.int32))
         work.broad_phase.bodies.rebuild()
-        graph = self.buffers.graph(damping_stages, bool(self._overlapping))
-        part = PART if in_parts.any() else self._n.max()
-        for count, begun, ends in segments(self._n, part):
-            if self._turns:
-                self._turns.begin(begun, self._dt, work, self._start)
+        graph = self.buffers.graph(damping_stages, bool(self._overlapping.any()))
+        for count, begun, looked in segments(self._n, in_parts, PART):
+            self._turns.begin(begun, self._dt, work, self._start)
             work.steps.fill_(count)
             wp.capture_launch(graph)
-            if ends or enlarged(work) is not None:
-                given = self.spectrum, in_parts if ends == "part" else None
-                after, wrong = rates_now(self._model, self._state, *given)
-                if wrong or not self._fit(rates, after).all() or enlarged(work) is not None:
+            full = enlarged(work) is not None
+            if full or looked is None or looked.any():
+                given = self._state, self.spectrum, None if full else looked
+                after, wrong = rates_now(self._model, *given)
+                if full or wrong or not self._fit(rates, after).all():
                     break
+        self._turns.end(work, self._start)
         return after, wrong
 
     def _begin(self) -> None:
@@ -289,12 +287,11 @@ class Stepper:
         """Leave the frame as if it had not begun, wherever it was interrupted."""
         self.last = self._before
         self.spectrum.remind(self._memory)
+        self._put_back()
         if self.sleeping:
             self.sleeping.undo()
-        self._put_back()
 
     def _put_back(self) -> None:
         self.buffers.mend(self._start.n_pair)
-        if self._turns:
-            self._turns.let_all(self.work)
+        self._turns.let_all(self.work)
         self._start.undo(self._state, self.work)

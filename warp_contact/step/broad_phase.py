@@ -73,7 +73,7 @@ def _list_none(work: Work) -> None:
 
 
 def _move(model: Model, x: wp.array, last: wp.array, motion: wp.array) -> None:
-    """Update ``motion`` of each body by that from ``last`` to ``x``, which is ``last`` from now on."""
+    """Update ``motion`` of each body by that from ``last``, which becomes ``x``."""
     chunks = -(-model.n_vert // int(skins.CHUNK))
     inputs = [model.vert_body, x]
     wp.launch(skins.find_motion, dim=chunks, inputs=inputs, outputs=[last, motion])

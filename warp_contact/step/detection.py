@@ -10,26 +10,14 @@ from warp_contact.step import impulse, narrow_phase
 
 def detect(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """Contacts of vertices and edges at ``x``, in a step from ``x0``, and their constants."""
-    narrow_phase.find_inner_vertices(model, x0, x, work)
+    narrow_phase.find_vertices(model, x0, x, work)
     narrow_phase.clear_places(work)
-    narrow_phase.find_inner_edges(model, x0, x, work)
-    _hold(model, x0, work)
-
-
-def detect_apart(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
-    """The same where bodies were apart when the step began."""
-    narrow_phase.find_entered_vertices(model, x0, x, work)
-    narrow_phase.clear_places(work)
-    narrow_phase.find_entered_edges(model, x0, x, work)
-    _hold(model, x0, work)
+    narrow_phase.find_edges(model, x0, x, work)
+    if_any(work.narrow_phase.n_crossing, narrow_phase.append_edge_contacts, model, x0, work)
+    if_any(work.contacts.n, impulse.begin, model, x0, work)
 
 
 def detect_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """Contacts of vertices alone, as in the paper."""
-    narrow_phase.find_inner_vertices(model, x0, x, work)
-    if_any(work.contacts.n, impulse.begin, model, x0, work)
-
-
-def _hold(model: Model, x0: wp.array, work: Work) -> None:
-    if_any(work.narrow_phase.n_crossing, narrow_phase.append_edge_contacts, model, x0, work)
+    narrow_phase.find_vertices(model, x0, x, work)
     if_any(work.contacts.n, impulse.begin, model, x0, work)

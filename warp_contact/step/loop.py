@@ -13,7 +13,7 @@ from warp_contact.kernels.motion import motion
 from warp_contact.step.damping import remember_contacts
 from warp_contact.step.other_responses import step_literal, step_penalty, step_predicted
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
-from warp_contact.step.step import step, step_overlapping
+from warp_contact.step.step import step
 
 
 def take_steps(model: Model, state: State, work: Work, damping_stages: int, one: Callable) -> None:
@@ -22,16 +22,14 @@ def take_steps(model: Model, state: State, work: Work, damping_stages: int, one:
 
 
 def step_of(response: ContactSurface | Penalty | PredictedForce, overlapping: bool) -> Callable:
-    """The step of a response; ``overlapping`` where bodies may have overlapped before."""
+    """The step of a response; ``overlapping`` where bodies may have overlapped in a world."""
     if isinstance(response, Penalty):
         return partial(step_penalty, response=response)
     if isinstance(response, PredictedForce):
         return step_predicted
     if response.search == "literal":
         return partial(step_literal, iterations=response.iterations)
-    if overlapping:
-        return partial(step_overlapping, iterations=response.iterations)
-    return step
+    return partial(step, iterations=response.iterations if overlapping else 0)
 
 
 def _take_one(model: Model, state: State, work: Work, damping_stages: int, one: Callable) -> None:

@@ -1,8 +1,9 @@
 """Narrow phase: which vertices lie inside other bodies, and which edges cross them.
 
-There are two ways to find a contact. If bodies were apart when the step began, every overlap has
-arisen within the step, and the side by which a vertex came in tells the direction. If they may have
-overlapped before, only the depth does.
+There are two ways to find a contact. In worlds where bodies were apart when the step began, every
+overlap has arisen within the step, and the side by which a vertex came in tells the direction. In
+those where they may have overlapped before, only the depth does: see ``apart`` in
+``kernels/worlds.py``.
 """
 
 from functools import partial
@@ -20,24 +21,55 @@ from warp_contact.step.contact_graph import count_contacts
 from warp_contact.step.depth import find_depths
 
 
-def find_entered_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
-    """Contacts of the vertices inside other bodies at ``x``; they were apart at ``x0``."""
-    _find_vertices(model, x0, x, work, apart=True)
+def find_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Contacts of the vertices inside other bodies at ``x``, in a step from ``x0``."""
+
+    def find() -> None:
+        _find_penetrations(model, x, work)
+        if_any(work.contacts.n_vertex, make_contacts, otherwise=work.contacts.n.zero_)
+
+    def make_contacts() -> None:
+        find_depths(model, x, work)
+        launch_over(
+            vertex_contact.vertex_contacts,
+            work.capacity.contacts,
+            inputs=[work.worlds, work.mesh, x0, x, work.contacts.n_vertex, n.penetration],
+            outputs=[work.contacts.record],
+        )
+        count_contacts(work, n.none, n.none)
+
+    def find_none() -> None:
+        work.contacts.n_vertex.zero_()
+        work.contacts.n.zero_()
+
+    n = work.narrow_phase
+    if_any(work.broad_phase.verts.n, find, otherwise=find_none)
 
 
-def find_inner_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
-    """Contacts of the vertices inside other bodies at ``x``; they may have been so at ``x0``."""
-    _find_vertices(model, x0, x, work, apart=False)
-
-
-def find_entered_edges(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+def find_edges(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """Contacts of the edges across other bodies at ``x``, beside the persistent ones."""
-    _find_edges(model, x0, x, work, apart=True)
 
+    def find() -> None:
+        b, travel = work.broad_phase, work.broad_phase.edges.travel
+        track(model, x, travel, work)
+        launch_over(
+            edges.find_crossings,
+            work.capacity.edges,
+            inputs=[work.mesh, b.edges.list, b.skin, travel.recent, travel.travelled, x0, x],
+            outputs=[b.edges.clear_until, b.apart, n.place, n.found, n.crossing_at]
+            + [n.n_place, n.n_new, work.worlds],
+        )
+        scan(n.crossing_at, work.scan, inclusive=False)
 
-def find_inner_edges(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
-    """The same where bodies may have overlapped at ``x0``."""
-    _find_edges(model, x0, x, work, apart=False)
+    def find_none() -> None:
+        n.n_crossing.zero_()
+        n.new.zero_()
+
+    n = work.narrow_phase
+    if on("edges"):
+        if_any(work.broad_phase.edges.n, find, otherwise=find_none)
+    else:
+        find_none()
 
 
 def clear_places(work: Work) -> None:
@@ -47,7 +79,7 @@ def clear_places(work: Work) -> None:
 
 
 def continue_edges(model: Model, x0: wp.array, work: Work) -> None:
-    """Begin with the persistent contacts of edges; the step begins at ``x0``."""
+    """Begin with the persistent contacts of edges, if any; the step begins at ``x0``."""
     none = partial(clear_places, work)
     if not on("persistent edges"):
         return none()
@@ -65,29 +97,6 @@ def append_edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
         outputs=[c.record, n.source],
     )
     count_contacts(work, n.n_crossing, n.n_place)
-
-
-def _find_vertices(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool) -> None:
-    def find() -> None:
-        _find_penetrations(model, x, work)
-        if_any(work.contacts.n_vertex, make_contacts, otherwise=work.contacts.n.zero_)
-
-    def make_contacts() -> None:
-        find_depths(model, x, work)
-        launch_over(
-            vertex_contact.vertex_contacts,
-            work.capacity.contacts,
-            inputs=[apart, work.mesh, x0, x, work.contacts.n_vertex, n.penetration],
-            outputs=[work.contacts.record],
-        )
-        count_contacts(work, n.none, n.none)
-
-    def find_none() -> None:
-        work.contacts.n_vertex.zero_()
-        work.contacts.n.zero_()
-
-    n = work.narrow_phase
-    if_any(work.broad_phase.verts.n, find, otherwise=find_none)
 
 
 def _find_penetrations(model: Model, x: wp.array, work: Work) -> None:
@@ -109,40 +118,17 @@ def _find_penetrations(model: Model, x: wp.array, work: Work) -> None:
     )
 
 
-def _find_edges(model: Model, x0: wp.array, x: wp.array, work: Work, apart: bool) -> None:
-    def find() -> None:
-        b, travel = work.broad_phase, work.broad_phase.edges.travel
-        track(model, x, travel, work)
-        launch_over(
-            edges.find_crossings,
-            work.capacity.edges,
-            inputs=[apart, work.mesh, b.edges.list, b.skin, travel.recent, travel.travelled]
-            + [x0, x],
-            outputs=[b.edges.clear_until, b.apart, n.place, n.found, n.crossing_at]
-            + [n.n_place, n.n_new, work.worlds],
-        )
-        scan(n.crossing_at, work.scan, inclusive=False)
-
-    def find_none() -> None:
-        n.n_crossing.zero_()
-        n.new.zero_()
-
-    n = work.narrow_phase
-    if on("edges"):
-        if_any(work.broad_phase.edges.n, find, otherwise=find_none)
-    else:
-        find_none()
-
-
 def _continue_edges(model: Model, x0: wp.array, work: Work) -> None:
     n = work.narrow_phase
     n.place.fill_(-1)
     n.crossing_at.zero_()
+    wp.copy(n.n_place, work.warm.n_edge)
     launch_over(
         persistent.continue_contacts,
         work.capacity.contacts,
-        inputs=[work.warm.n_edge, work.warm.edges, work.broad_phase.edges.list, work.mesh, x0],
-        outputs=[n.crossing_at, n.place, n.found, n.n_place],
+        inputs=[work.warm.n_edge, work.warm.edges, work.broad_phase.edges.list]
+        + [work.mesh, work.worlds, x0],
+        outputs=[n.crossing_at, n.place, n.found],
     )
     scan(n.crossing_at, work.scan, inclusive=False)
     if_any(n.n_crossing, append_edge_contacts, model, x0, work)

@@ -1,4 +1,7 @@
-"""One step of the responses that the default is compared with."""
+"""One step of the responses that the default is compared with.
+
+Overlaps may be left by any of them: bodies are never known to be apart when a step begins.
+"""
 
 import warp as wp
 
@@ -18,6 +21,7 @@ def step_literal(
     model: Model, state: State, work: Work, damping_stages: int, iterations: int
 ) -> None:
     """The order and the bisection of the paper: displacement first, then velocities."""
+    work.worlds.apart.zero_()
     predict(model, state, work, damping_stages)
     broad_phase.refresh(model, state.x, work.x, work)
     wp.copy(state.x, work.x)
@@ -36,6 +40,7 @@ def step_penalty(
     They are no impulses that answer to a load, so that none can be expected of the next step, and
     the damping acts alone, before all forces: the state at rest must not depend on it.
     """
+    work.worlds.apart.zero_()
     broad_phase.refresh(model, state.x, state.x, work)
     detect(model, state.x, state.x, work)
     if damping_stages > 0:
@@ -48,6 +53,7 @@ def step_penalty(
 
 def step_predicted(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Forces that close the gaps predicted for the end of the step; overlaps may last."""
+    work.worlds.apart.zero_()
     predict(model, state, work, damping_stages)
     broad_phase.refresh(model, state.x, work.x, work)
     detect(model, state.x, work.x, work)
@@ -58,6 +64,7 @@ def step_predicted(model: Model, state: State, work: Work, damping_stages: int) 
 
 def push_half_step(model: Model, now: State, work: Work, response: Penalty) -> None:
     """Add what the penalty forces at ``now.x`` add to ``now.v`` in half a step."""
+    work.worlds.apart.zero_()
     detect(model, now.x, now.x, work)
     if_any(work.contacts.n, _push, model, now, work, response)
 

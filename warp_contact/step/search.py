@@ -13,14 +13,17 @@ from warp_contact.kernels.surface import region, search, spin
 from warp_contact.step.forces import internal_forces
 
 
-def begin(model: Model, x: wp.array, work: Work) -> None:
-    """Set the displacement vectors, the touching tets, and ``work.x`` before the search."""
+def begin(model: Model, x: wp.array, work: Work, moves: wp.array) -> None:
+    """Set the displacement vectors, the touching tets, and ``work.x`` before the search.
+
+    Only in worlds where ``moves``, shape (n_world,), is not 0.
+    """
     c, s = work.contacts, work.surface
     wp.copy(work.x, x)
     wp.launch(
         region.displacement_vectors,
         dim=model.n_vert,
-        inputs=[c.graph, c.record, s.residual, work.mobility],
+        inputs=[c.graph, c.record, s.residual, work.mobility, work.worlds, moves],
         outputs=[s.s],
     )
     wp.launch(region.touching_tets, dim=model.n_tet, inputs=[model.tets, s.s], outputs=[s.mask])
@@ -28,8 +31,8 @@ def begin(model: Model, x: wp.array, work: Work) -> None:
 
 def balance(model: Model, x: wp.array, work: Work, iterations: int) -> None:
     """Move the region to where the pressures of both sides balance, by ``SEARCH_BOUND`` at most."""
-    begin(model, x, work)
     s = work.surface
+    begin(model, x, work, s.old)
     wp.launch(
         search.begin_balance,
         dim=model.n_vert,
@@ -72,8 +75,8 @@ def keep_spin(model: Model, state: State, work: Work) -> None:
 
 def bisect(model: Model, x: wp.array, work: Work, iterations: int) -> None:
     """Move the region by the search as the paper prints it."""
-    begin(model, x, work)
     s = work.surface
+    begin(model, x, work, s.open)
     wp.launch(
         search.begin_literal,
         dim=model.n_vert,

@@ -17,21 +17,18 @@ from warp_contact.kernels.surface import closure
 from warp_contact.kernels.worlds import FIRST_LOOK, SECOND_LOOK
 from warp_contact.step import coupled, residual, search, sweeps
 from warp_contact.step.contact_graph import add_parts
-from warp_contact.step.detection import detect, detect_apart
+from warp_contact.step.detection import detect
 
 
-def close_gaps(model: Model, state: State, work: Work) -> None:
-    """Close the residual overlaps, where bodies were apart when the step began."""
+def close_gaps(model: Model, state: State, work: Work, iterations: int) -> None:
+    """Search the surface between bodies that overlapped before the step, then close the rest.
+
+    ``iterations`` are those of the search; 0 where nothing can have overlapped before.
+    """
     residual.add_gaps(model, state.x, work)
     if on("strays"):
         residual.add_strays(model, state.x, state.v, work)
-    if_any(work.surface.any_open, _close_gaps, model, state, work)
-
-
-def resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
-    """Search the surface between bodies that overlapped before the step, then close the rest."""
-    residual.add_gaps(model, state.x, work)
-    if_any(work.surface.any_open, _resolve_overlaps, model, state, work, iterations)
+    if_any(work.surface.any_open, _close_gaps, model, state, work, iterations)
 
 
 def close(model: Model, state: State, work: Work, look: int = FIRST_LOOK) -> None:
@@ -41,36 +38,29 @@ def close(model: Model, state: State, work: Work, look: int = FIRST_LOOK) -> Non
     triangles, edges on what they touch. Contacts that overlapped when the step began are left out.
     ``state.v`` changes only by the torque that keeps the angular momentum.
     """
-    _close(model, state, work, look, OLD_OVERLAP)
+    _close(model, state, work, look, OLD_OVERLAP, OLD_OVERLAP)
 
 
 def close_all(model: Model, state: State, work: Work, look: int = FIRST_LOOK) -> None:
     """The same with all contacts."""
-    _close(model, state, work, look, math.inf)
+    _close(model, state, work, look, math.inf, math.inf)
 
 
-def _close_gaps(model: Model, state: State, work: Work) -> None:
-    # No overlap is older than the step: one that seems so has a wrong plane, and the second look
-    # may find a better one.
-    (close if on("old planes") else close_all)(model, state, work)
+def _close_gaps(model: Model, state: State, work: Work, iterations: int) -> None:
+    searched = OLD_OVERLAP if on("search") else math.inf
+    if iterations and on("search"):
+        if_any(work.surface.any_old, _search, model, state, work, iterations)
+    # Where bodies were apart, no overlap is older than the step: one that seems so has a wrong
+    # plane, and the second look may find a better one.
+    first = OLD_OVERLAP if on("old planes") else math.inf
+    _close(model, state, work, FIRST_LOOK, searched, first)
     # Vertices may now be at other triangles than before, and edges may cross that the narrow phase
     # could not see.
     if on("second look"):
-        detect_apart(model, state.x, state.x, work)
-    residual.find_gaps_left(model, state.x, work)
-    if_any(work.surface.any_open, close_all, model, state, work, SECOND_LOOK)
-
-
-def _resolve_overlaps(model: Model, state: State, work: Work, iterations: int) -> None:
-    searched = on("search")
-    if searched:
-        if_any(work.surface.any_old, _search, model, state, work, iterations)
-    rest = close if searched else close_all
-    rest(model, state, work)
-    if on("second look"):
         detect(model, state.x, state.x, work)
     residual.find_gaps_left(model, state.x, work)
-    if_any(work.surface.any_open, rest, model, state, work, SECOND_LOOK)
+    rest = SECOND_LOOK, searched, math.inf
+    if_any(work.surface.any_open, _close, model, state, work, *rest)
 
 
 def _search(model: Model, state: State, work: Work, iterations: int) -> None:
@@ -79,15 +69,19 @@ def _search(model: Model, state: State, work: Work, iterations: int) -> None:
         search.keep_spin(model, state, work)
 
 
-def _close(model: Model, state: State, work: Work, look: int, deep: float) -> None:
-    """Close all contacts but those that overlapped by more than ``deep`` edges at the start."""
+def _close(model: Model, state: State, work: Work, look: int, before: float, apart: float) -> None:
+    """Close all contacts but those that overlapped by more than some edges at the start.
+
+    ``before`` in worlds where bodies may have overlapped then, ``apart`` where they were apart.
+    """
     if not on("closure"):
         return
     c, s = work.contacts, work.surface
     launch_over(
         closure.begin_closure,
         work.capacity.contacts,
-        inputs=[search.SEARCH_BOUND, deep, c.n, c.record, c.constraint, work.dt, s.residual],
+        inputs=[wp.vec3(before, apart, search.SEARCH_BOUND), c.n, c.record, c.constraint]
+        + [work.dt, s.residual, work.worlds],
         outputs=[s.slack, s.push],
     )
     if work.implicit:

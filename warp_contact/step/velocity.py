@@ -61,11 +61,13 @@ def answer_of(response: ContactSurface | Penalty | PredictedForce, apart: bool) 
 
 
 def _answer_apart(model: Model, now: State, work: Work) -> None:
-    narrow_phase.find_entered_vertices(model, now.x, work.x, work)
+    work.worlds.apart.fill_(1)
+    narrow_phase.find_vertices(model, now.x, work.x, work)
     narrow_phase.continue_edges(model, now.x, work)
     if_any(work.contacts.n, impulse.solve_half_step, model, now, work)
 
 
 def _answer(model: Model, now: State, work: Work) -> None:
+    work.worlds.apart.zero_()
     detect(model, now.x, now.x, work)
     if_any(work.contacts.n, impulse.solve_half_step, model, now, work)

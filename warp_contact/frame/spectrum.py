@@ -137,7 +137,7 @@ class Spectrum:
 
     def remind(self, memory: tuple, of: np.ndarray | None = None) -> None:
         """Put back what was kept in the ``memory``, which is used up; of some worlds, or of all."""
-        if of is not None and not of.all():
+        if of is not None and not of.all() and self._at is not None:
             starts, at, of_bodies, flat = memory
             own = of[self.worlds.of_vert, None]
             for apply, start in starts.items():

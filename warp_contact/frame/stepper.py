@@ -17,6 +17,7 @@ from warp_contact.frame.capacity import enlarged
 from warp_contact.frame.damping import prepare, stages_for
 from warp_contact.frame.diagnosis import finite_vertices, too_damped
 from warp_contact.frame.frame_start import FrameStart
+from warp_contact.frame.inversion import Inversion
 from warp_contact.frame.last_frame import LastFrame, none_yet
 from warp_contact.frame.overlap import find_overlaps
 from warp_contact.frame.rates import rates_now
@@ -59,19 +60,19 @@ class Stepper:
         implicit: bool,
     ):
         """Allocate what the steps need, on the current device."""
-        self.fps, self.wanted = fps, wanted
+        self.fps, self.wanted, self._model, self._state = fps, wanted, model, state
         may_sleep = sleeping and any(model.gravity)  # else a slow body may be in free flight
         self.worlds = Worlds(model)
         self.last = none_yet(self.worlds.n)
         self.first = state.x.numpy().copy(), state.v.numpy().copy()
-        self._model, self._state = model, state
         self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, implicit)
         self.spectrum = Spectrum(model, self.worlds, implicit)
+        self._inversion = Inversion(model, self.worlds, implicit)
         self._turns = Turns(model, self.worlds, may_sleep)
         self.sleeping = Sleeping(model, state, fps, self._turns) if may_sleep else None
         self.buffers = Buffers(model, state, response, self._turns.awake, self.worlds, implicit)
-        self._start = FrameStart(state, self.work)
-        self._cut, self._first_capacity = False, self.work.capacity
+        self._start, self._cut = FrameStart(state, self.work), False
+        self._first_capacity = self.work.capacity
 
     @property
     def work(self) -> Work:
@@ -116,9 +117,9 @@ class Stepper:
 
     def _find_step(self, frame: int) -> np.ndarray:
         """Step the frame until its steps fit; return the last rates [1/s], (2, n_world)."""
-        rates = self._rates()
+        rates, halved = self._rates(), 0
         self._step_count.check(self._state, rates[0], frame)
-        halved = 0
+        self._inversion.begin(self._state)
         in_parts = self._flat()
         for _ in range(ATTEMPTS):
             kept = self.spectrum.memory()
@@ -270,6 +271,8 @@ class Stepper:
             if full or looked is None or looked.any():
                 given = self._state, self.spectrum, None if full else looked
                 after, wrong = rates_now(self._model, *given)
+                if not (full or wrong):
+                    after = self._inversion.held_against(after, self._state, self._dt)
                 if full or wrong or not self._fit(rates, after).all():
                     break
         self._turns.end(work, self._start)

@@ -3,7 +3,7 @@
 from warp_contact import interrupts  # noqa: F401  first, as the others take a second
 from warp_contact.errors import SimulationError
 from warp_contact.measure.measure import Measure
-from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork
+from warp_contact.scene.materials import Corotated, NeoHookean, Rigid, SpringNetwork
 from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.scene import Body, Scene
 from warp_contact.scene.shapes import box, cylinder, dish, sphere
@@ -20,6 +20,7 @@ __all__ = [
     "NeoHookean",
     "Penalty",
     "PredictedForce",
+    "Rigid",
     "Scene",
     "Simulation",
     "SimulationError",

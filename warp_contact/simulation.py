@@ -90,8 +90,8 @@ class Simulation:
         self.model, self.state = of = assemble(self.scene)
         self.scene.freeze()
         self._bodies = Bodies(self.model, self.scene)
-        load_kernels(self.model, self.device, integrator != "explicit")
         self._integrator = choose(integrator, *of, self.response, sleeping)
+        load_kernels(self.model, self.device, self._integrator.implicit)
         settings = self.response, self.fps, substeps, max_substeps, sleeping
         self._stepper = Stepper(*of, *settings, self._integrator.implicit)
         self._meter = Meter(self.model)

@@ -10,12 +10,13 @@ grow, and a stiff one would turn that into energy.
 import warp as wp
 
 from warp_contact.kernels.implicit.bodies import (
-    FREE,
+    RIGID,
     Implicit,
-    Rigid,
+    RigidMotion,
     as_mat33,
     as_vec3,
     as_vec3d,
+    floats,
     moves,
 )
 from warp_contact.kernels.options import OPTIONS
@@ -55,13 +56,13 @@ def find_drift(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     d: Implicit,
-    motion: Rigid,  # of v
+    motion: RigidMotion,  # of v
     # out
     to: Drift,
 ):
     """One thread per body: its rotation in this step, and its rate at the end."""
     b = wp.tid()
-    if not moves(b, d) or d.kind[b] != FREE:
+    if not moves(b, d) or not floats(b, d):
         return
     first = d.body_vert[b]
     last = d.body_vert[b + 1]
@@ -75,6 +76,8 @@ def find_drift(
         m = wp.float64(d.mass[i])
         r = x[i] - c
         u = v[i] - motion.v[b] - wp.cross(w, r)
+        if d.kind[b] == RIGID:  # rounding
+            u = wp.vec3(0.0, 0.0, 0.0)
         q = as_vec3d(r) + h * as_vec3d(u)
         inertia += m * (wp.dot(q, q) * wp.identity(n=3, dtype=wp.float64) - wp.outer(q, q))
         spin += m * wp.cross(as_vec3d(r), as_vec3d(v[i] - motion.v[b]))
@@ -98,7 +101,7 @@ def advance(
     dt: wp.array[float],  # (n_vert,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     d: Implicit,
-    motion: Rigid,  # of v
+    motion: RigidMotion,  # of v
     to: Drift,
     turned: bool,  # whether v becomes that at the new positions
     # in, out
@@ -110,11 +113,13 @@ def advance(
     i = wp.tid()
     b = d.vert_body[i]
     h = dt[i]
-    if not moves(b, d) or d.kind[b] != FREE:
+    if not moves(b, d) or not floats(b, d):
         x_new[i] = x[i] + h * v[i]
         return
     r = x[i] - d.centre[b]
     u = v[i] - motion.v[b] - wp.cross(motion.w[b], r)
+    if d.kind[b] == RIGID:
+        u = wp.vec3(0.0, 0.0, 0.0)
     # What is added is small against x, and is therefore added last.
     q = r + h * u
     moved = to.turn[b] * q

@@ -16,6 +16,7 @@ wp.set_module_options(OPTIONS)
 LUMPED = wp.constant(0)  # takes explicit steps, or is fixed as a whole
 FREE = wp.constant(1)
 HELD = wp.constant(2)  # some of its vertices are fixed
+RIGID = wp.constant(3)
 
 UPRIGHT = wp.constant(0.05)  # determinant, of a gradient of size 1: above it Newton is fast
 ROUNDS = wp.constant(8)
@@ -46,8 +47,8 @@ class Implicit:
 
 
 @wp.struct
-class Rigid:
-    """Rigid motion of each body."""
+class RigidMotion:
+    """The rigid motion of each body."""
 
     v: wp.array[wp.vec3]  # (n_body,) [m/s] of its centre
     w: wp.array[wp.vec3]  # (n_body,) [1/s]
@@ -60,7 +61,19 @@ def moves(b: int, d: Implicit) -> bool:
 
 
 @wp.func
-def rigid_at(i: int, b: int, x: wp.vec3, d: Implicit, motion: Rigid) -> wp.vec3:
+def floats(b: int, d: Implicit) -> bool:
+    """Whether a body has no fixed vertices: its rigid motion is its own."""
+    return d.kind[b] == FREE or d.kind[b] == RIGID
+
+
+@wp.func
+def deforms(b: int, d: Implicit) -> bool:
+    """Whether a body takes implicit steps, and is not rigid."""
+    return moves(b, d) and d.kind[b] != RIGID
+
+
+@wp.func
+def rigid_at(i: int, b: int, x: wp.vec3, d: Implicit, motion: RigidMotion) -> wp.vec3:
     """Velocity [m/s] of the rigid motion of body b at its vertex i."""
     return motion.v[b] + wp.cross(motion.w[b], x - d.centre[b])
 
@@ -135,7 +148,7 @@ def find_gradients(
 ):
     """One thread per tet: its deformation gradient times its volume."""
     q = wp.tid()
-    if moves(d.vert_body[tets[q][0]], d):
+    if deforms(d.vert_body[tets[q][0]], d):
         gradient[q] = volume[q] * element.rate(q, tets, pose, x)
 
 
@@ -174,9 +187,45 @@ def find_turns(
     """One thread per vertex: R_i."""
     i = wp.tid()
     b = d.vert_body[i]
-    if not moves(b, d):
+    if not deforms(b, d):
         return
     f = wp.mat33(0.0)
     for k in range(vt_start[i], vt_start[i + 1]):
         f += gradient[vt_corner[k] // 4]
     d.turn[i] = polar(f) @ d.placed[b]
+
+
+@wp.kernel
+def keep_shapes(
+    # in
+    d: Implicit,
+    # in, out
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+):
+    """One thread per rigid body: the shape at rest, moved to where the body is.
+
+    Without it, rounding would change the shape over many steps.
+    """
+    b = wp.tid()
+    if d.kind[b] != RIGID or d.awake[b] == 0:
+        return
+    first = d.body_vert[b]
+    last = d.body_vert[b + 1]
+    origin = x[first]
+    total = wp.float64(0.0)
+    moment = wp.vec3d()
+    for i in range(first, last):
+        m = wp.float64(d.mass[i])
+        total += m
+        moment += m * as_vec3d(x[i] - origin)
+    c = origin + as_vec3(moment / total)
+    now = wp.mat33d()
+    before = wp.mat33d()
+    for i in range(first, last):
+        r = as_vec3d(d.rest[i])
+        now += wp.float64(d.mass[i]) * wp.outer(as_vec3d(x[i] - c), r)
+        before += wp.float64(d.mass[i]) * wp.outer(r, r)
+    scale = wp.trace(before)
+    turn = polar(as_mat33((now / scale) * wp.inverse(before / scale)))
+    for i in range(first, last):
+        x[i] = c + turn * d.rest[i]

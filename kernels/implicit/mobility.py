@@ -17,11 +17,12 @@ linear and angular momentum of the impulses, whatever S is. A body with fixed ve
 import warp as wp
 
 from warp_contact.kernels.implicit.bodies import (
-    FREE,
+    RIGID,
     Implicit,
-    Rigid,
+    RigidMotion,
     as_vec3,
     as_vec3d,
+    floats,
     moves,
     rigid_at,
 )
@@ -31,7 +32,7 @@ wp.set_module_options(OPTIONS)
 
 
 @wp.func
-def rigid_motion(b: int, total: wp.vec3d, turning: wp.vec3d, d: Implicit, motion: Rigid):
+def rigid_motion(b: int, total: wp.vec3d, turning: wp.vec3d, d: Implicit, motion: RigidMotion):
     """Set the rigid motion of body b by linear and angular momentum."""
     motion.v[b] = d.inv_total[b] * as_vec3(total)
     motion.w[b] = d.inv_inertia[b] * as_vec3(turning)
@@ -39,7 +40,7 @@ def rigid_motion(b: int, total: wp.vec3d, turning: wp.vec3d, d: Implicit, motion
 
 @wp.func
 def find_response(
-    b: int, p: wp.array[wp.vec3], x: wp.array[wp.vec3], d: Implicit, motion: Rigid
+    b: int, p: wp.array[wp.vec3], x: wp.array[wp.vec3], d: Implicit, motion: RigidMotion
 ) -> bool:
     """Set the rigid motion of body b by impulses p [kg m/s]; whether there are any."""
     c = d.centre[b]
@@ -57,7 +58,9 @@ def find_response(
 
 
 @wp.func
-def find_rigid_part(b: int, y: wp.array[wp.vec3], x: wp.array[wp.vec3], d: Implicit, motion: Rigid):
+def find_rigid_part(
+    b: int, y: wp.array[wp.vec3], x: wp.array[wp.vec3], d: Implicit, motion: RigidMotion
+):
     """Set the rigid part of velocities y [m/s] of body b."""
     c = d.centre[b]
     total = wp.vec3d()
@@ -76,7 +79,7 @@ def rigid_response(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     d: Implicit,
     # out
-    motion: Rigid,
+    motion: RigidMotion,
 ):
     """One thread per body: its rigid motion by impulses."""
     b = wp.tid()
@@ -91,11 +94,11 @@ def rigid_part(
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     d: Implicit,
     # out
-    motion: Rigid,
+    motion: RigidMotion,
 ):
     """One thread per body without fixed vertices: the rigid part of velocities."""
     b = wp.tid()
-    if moves(b, d) and d.kind[b] == FREE:
+    if moves(b, d) and floats(b, d):
         find_rigid_part(b, y, x, d, motion)
 
 
@@ -107,8 +110,8 @@ def to_rest(
     d: Implicit,
     chosen: wp.array[int],  # (n_body,) 0 where no answer is needed; empty if all are
     # out
-    motion: Rigid,  # by p
-    rest: Rigid,  # motion at rest by z
+    motion: RigidMotion,  # by p
+    rest: RigidMotion,  # motion at rest by z
     busy: wp.array[int],  # (n_body,) 1 where there is anything to answer
     z: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
 ):
@@ -123,6 +126,8 @@ def to_rest(
     if not find_response(b, p, x, d, motion):
         return
     busy[b] = 1
+    if d.kind[b] == RIGID:
+        return
     total = wp.vec3d()
     turning = wp.vec3d()
     for i in range(d.body_vert[b], d.body_vert[b + 1]):
@@ -134,7 +139,7 @@ def to_rest(
             turning += wp.cross(as_vec3d(d.rest[i]), as_vec3d(q))
     rest.v[b] = d.inv_total[b] * as_vec3(total)
     rest.w[b] = wp.vec3(0.0, 0.0, 0.0)
-    if d.kind[b] == FREE:
+    if floats(b, d):
         rest.w[b] = d.rest_inertia[b] * as_vec3(turning)
 
 
@@ -143,7 +148,7 @@ def multiply(
     # in
     z: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
     d: Implicit,
-    rest: Rigid,  # motion at rest by z
+    rest: RigidMotion,  # motion at rest by z
     busy: wp.array[int],  # (n_body,)
     # out
     y: wp.array[wp.vec3],  # (n_vert,) [m/s]
@@ -151,7 +156,7 @@ def multiply(
     """One thread per vertex: R A0^-1 z."""
     i = wp.tid()
     b = d.vert_body[i]
-    if busy[b] == 0:
+    if busy[b] == 0 or d.kind[b] == RIGID:
         return
     first = d.body_vert[b]
     n = d.body_vert[b + 1] - first
@@ -167,19 +172,22 @@ def correct(
     # in
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     d: Implicit,
-    right: Rigid,  # by the impulses
+    right: RigidMotion,  # by the impulses
     busy: wp.array[int],  # (n_body,)
     # out
-    wrong: Rigid,  # with the velocities y
+    wrong: RigidMotion,  # with the velocities y
     # in, out
     y: wp.array[wp.vec3],  # (n_vert,) [m/s]
 ):
     """One thread per body: give y the rigid motion that it should have; 0 where nothing is busy."""
     b = wp.tid()
-    if busy[b] != 0 and d.kind[b] == FREE:
+    free = busy[b] != 0 and floats(b, d)
+    if free and d.kind[b] != RIGID:
         find_rigid_part(b, y, x, d, wrong)
     for i in range(d.body_vert[b], d.body_vert[b + 1]):
         if busy[b] == 0:
             y[i] = wp.vec3(0.0, 0.0, 0.0)
-        elif d.kind[b] == FREE:
+        elif d.kind[b] == RIGID:
+            y[i] = rigid_at(i, b, x[i], d, right)
+        elif free:
             y[i] = y[i] - rigid_at(i, b, x[i], d, wrong) + rigid_at(i, b, x[i], d, right)

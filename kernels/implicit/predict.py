@@ -13,7 +13,14 @@ motion from outside forces alone: internal ones have no resultant, and rounding 
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import FREE, HELD, Implicit, Rigid, moves, rigid_at
+from warp_contact.kernels.implicit.bodies import (
+    HELD,
+    Implicit,
+    RigidMotion,
+    floats,
+    moves,
+    rigid_at,
+)
 from warp_contact.kernels.motion.motion import corner_sum
 from warp_contact.kernels.options import OPTIONS
 
@@ -120,14 +127,14 @@ def remove_rigid(
     # in
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     d: Implicit,
-    motion: Rigid,  # by r
+    motion: RigidMotion,  # by r
     # in, out
     r: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
 ):
     """One thread per vertex: P^T r."""
     i = wp.tid()
     b = d.vert_body[i]
-    if moves(b, d) and d.kind[b] == FREE:
+    if moves(b, d) and floats(b, d):
         r[i] = r[i] - d.mass[i] * rigid_at(i, b, x[i], d, motion)
 
 
@@ -139,7 +146,7 @@ def kick(
     gravity: wp.vec3,  # [m/s^2]
     dt: wp.array[float],  # (n_vert,) [s] h, or a part of it
     d: Implicit,
-    motion: Rigid,  # of dv
+    motion: RigidMotion,  # of dv
     # in, out
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
 ):
@@ -149,6 +156,6 @@ def kick(
     if d.inv_mass[i] == 0.0 or not moves(b, d):
         return
     u = dv[i]
-    if d.kind[b] == FREE:
+    if floats(b, d):
         u += d.h[0] * gravity - rigid_at(i, b, x[i], d, motion)
     v[i] = v[i] + (dt[i] / d.h[0]) * u

@@ -12,7 +12,15 @@ The two differ only where a body is bent or sheared, by what the sweeps of this 
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import LUMPED, Implicit, Rigid, as_vec3, as_vec3d, moves
+from warp_contact.kernels.implicit.bodies import (
+    LUMPED,
+    RIGID,
+    Implicit,
+    RigidMotion,
+    as_vec3,
+    as_vec3d,
+    moves,
+)
 from warp_contact.kernels.impulse.constraint import Constraint, Impulse
 from warp_contact.kernels.impulse.impulse import (
     Limits,
@@ -142,7 +150,7 @@ def respond(
     d: Implicit,
     # out
     busy: wp.array[int],  # (n_body,) 1 where this sweep adds something, 2 where shares change
-    motion: Rigid,  # by what it adds
+    motion: RigidMotion,  # by what it adds
     z: wp.array[wp.vec3],  # (n_vert,) [kg y] R^T p
     # in, out
     share: wp.array[float],  # (n_vert,)
@@ -198,7 +206,7 @@ def move(
     z: wp.array[wp.vec3],  # (n_vert,) [kg y]
     share: wp.array[float],  # (n_vert,)
     busy: wp.array[int],  # (n_body,)
-    motion: Rigid,  # by what this sweep adds
+    motion: RigidMotion,  # by what this sweep adds
     d: Implicit,
     # in, out
     y: wp.array[wp.vec3],  # (n_vert,) velocities or positions
@@ -214,16 +222,18 @@ def move(
         if busy[b] == 0 or d.inv_mass[i] == 0.0:
             continue
         if busy[b] == 2:
-            row[i] = row_sum(i, share, touched, d)
+            row[i] = row_sum(i, share, touched, x, d)
         u = d.inv_mass[i] * z[i]
         if moves(b, d):
             first = d.body_vert[b]
             at = d.first[b] + (i - first) * (d.body_vert[b + 1] - first) - first
             u = wp.vec3(0.0, 0.0, 0.0)
-            for l in range(touched.n[b]):
-                j = touched.vert[first + l]
-                u += d.block[at + j] * z[j]
-            u = d.turn[i] * u + motion.v[b] + wp.cross(motion.w[b], x[i] - d.centre[b])
+            if d.kind[b] != RIGID:
+                for l in range(touched.n[b]):
+                    j = touched.vert[first + l]
+                    u += d.block[at + j] * z[j]
+                u = d.turn[i] * u
+            u += motion.v[b] + wp.cross(motion.w[b], x[i] - d.centre[b])
         y[i] = y[i] + u
         changed[i] = wp.where(
             wp.length(u) * dt[i] > worlds.negligible[worlds.of_vert[i]], sweep, changed[i]

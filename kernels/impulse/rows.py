@@ -10,7 +10,7 @@ inequality. Only contacts that may move count, those with an impulse or an appro
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import Implicit, moves
+from warp_contact.kernels.implicit.bodies import RIGID, Implicit, moves
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
 from warp_contact.kernels.options import OPTIONS
@@ -64,7 +64,9 @@ def share_of(
 
 
 @wp.func
-def row_sum(i: int, share: wp.array[float], touched: Touched, d: Implicit) -> float:
+def row_sum(
+    i: int, share: wp.array[float], touched: Touched, x: wp.array[wp.vec3], d: Implicit
+) -> float:
     """Row sum t of vertex i [1/kg]."""
     b = d.vert_body[i]
     if d.inv_mass[i] == 0.0:
@@ -74,6 +76,15 @@ def row_sum(i: int, share: wp.array[float], touched: Touched, d: Implicit) -> fl
     first = d.body_vert[b]
     at = d.first[b] + (i - first) * (d.body_vert[b + 1] - first) - first
     s = float(0.0)
+    if d.kind[b] == RIGID:
+        arm = float(0.0)
+        for k in range(touched.n[b]):
+            j = touched.vert[first + k]
+            s += share[j]
+            arm += share[j] * wp.length(x[j] - d.centre[b])
+        c = d.inv_inertia[b]  # its norm is at most that of Frobenius
+        own = wp.length(x[i] - d.centre[b])
+        return ROOM * (d.inv_total[b] * s + wp.sqrt(wp.ddot(c, c)) * own * arm)
     for k in range(touched.n[b]):
         j = touched.vert[first + k]
         s += d.norm[at + j] * share[j]
@@ -120,6 +131,7 @@ def find_rows(
     graph: ContactGraph,
     touched: Touched,
     share: wp.array[float],  # (n_vert,)
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
     d: Implicit,
     # out
     row: wp.array[float],  # (n_vert,) t_i
@@ -127,7 +139,7 @@ def find_rows(
     """For each vertex with contacts: its row sum."""
     for k in range(wp.tid(), graph.n_touched[0], threads):
         i = graph.touched[k]
-        row[i] = row_sum(i, share, touched, d)
+        row[i] = row_sum(i, share, touched, x, d)
 
 
 @wp.func

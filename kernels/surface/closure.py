@@ -23,6 +23,7 @@ import warp as wp
 from warp_contact.kernels.geometry import NONE
 from warp_contact.kernels.impulse.constraint import Constraint
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, REST_GAP
+from warp_contact.kernels.mobility import Mobility, mobility_of
 from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.worlds import DONE, Worlds
@@ -43,6 +44,7 @@ def begin_closure(
     dt: wp.array[float],  # (n_vert,) [s]
     residual: wp.array[float],  # (capacity,) [m]
     worlds: Worlds,
+    soft: Mobility,  # of what the search may move
     # out
     slack: wp.array[float],  # (capacity,) [m]
     push: wp.array[float],  # (capacity,) [kg m]
@@ -60,7 +62,9 @@ def begin_closure(
             slack[c] = wp.max(residual[c] - limits[2] * edge, 0.0) - REST_GAP * edge
         i = contact[c].vert[0]
         if -constraint[c].gap_bound * dt[i] > limits[worlds.apart[worlds.of_vert[i]]] * edge:
-            slack[c] = NONE
+            for k in range(5):
+                if mobility_of(contact[c].vert[k], soft) > 0.0:
+                    slack[c] = NONE
         push[c] = 0.0
 
 

@@ -8,9 +8,10 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake
 from warp_contact.kernels.implicit.advance import Drift
-from warp_contact.kernels.implicit.bodies import HELD, Implicit, Rigid
+from warp_contact.kernels.implicit.bodies import HELD, RIGID, Implicit, RigidMotion
 from warp_contact.kernels.implicit.solve import Iteration
 from warp_contact.kernels.impulse.rows import Touched
+from warp_contact.kernels.mobility import Mobility
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,8 @@ class ImplicitWork:
         bodies: what kernels know of them
         x: positions at which the mobilities are [m], shape (n_vert,)
         any_held: whether some of them have fixed vertices
+        any_rigid: whether some of them are rigid
+        soft: the mobilities of vertices that are not of rigid bodies
         gradient: deformation gradient times volume of each tet [m^3], shape (n_tet,)
         stiff, damped: corners of K p and C p [N], shape (4 n_tet,); ``damped`` is empty without
         f: forces [N], shape (n_vert,)
@@ -64,6 +67,8 @@ class ImplicitWork:
     bodies: Implicit
     x: wp.array[wp.vec3]
     any_held: bool
+    any_rigid: bool
+    soft: Mobility
     gradient: wp.array[wp.mat33]
     stiff: wp.array[wp.vec3]
     damped: wp.array[wp.vec3]
@@ -81,9 +86,9 @@ class ImplicitWork:
     touched: Touched
     counted: wp.array[int]
     ahead: wp.array[float]
-    by: Rigid
-    of: Rigid
-    rest: Rigid
+    by: RigidMotion
+    of: RigidMotion
+    rest: RigidMotion
     busy: wp.array[int]
     drift: Drift
     iteration: Iteration
@@ -101,6 +106,8 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
     return ImplicitWork(
         bodies=_bodies(model, shapes, awake),
         any_held=bool((shapes.kind == int(HELD)).any()),
+        any_rigid=bool((shapes.kind == int(RIGID)).any()),
+        soft=_soft(model, shapes),
         gradient=wp.zeros(n_tet, dtype=wp.mat33),
         stiff=wp.zeros(4 * n_tet, dtype=wp.vec3),
         damped=wp.zeros(4 * n_tet if damped else 0, dtype=wp.vec3),
@@ -149,8 +156,8 @@ def _bodies(model: Model, shapes: Shapes, awake: Awake) -> Implicit:
     return d
 
 
-def _rigid(n_body: int) -> Rigid:
-    motion = Rigid()
+def _rigid(n_body: int) -> RigidMotion:
+    motion = RigidMotion()
     motion.v, motion.w = (wp.zeros(n_body, dtype=wp.vec3) for _ in range(2))
     return motion
 
@@ -166,6 +173,14 @@ def _iteration(n_body: int) -> Iteration:
     it.going = wp.zeros(n_body, dtype=int)
     it.enough, it.now = (wp.zeros(n_body, dtype=wp.float64) for _ in range(2))
     return it
+
+
+def _soft(model: Model, shapes: Shapes) -> Mobility:
+    soft = Mobility()
+    rigid = (shapes.kind == int(RIGID))[model.vert_body.numpy()]
+    soft.inv_mass = wp.array(np.where(rigid, 0.0, model.inv_mass.numpy()), dtype=float)
+    soft.row = wp.zeros(0, dtype=float)
+    return soft
 
 
 def _touched(model: Model) -> Touched:

@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
-from warp_contact.kernels.implicit.bodies import FREE, HELD, LUMPED
+from warp_contact.kernels.implicit.bodies import FREE, HELD, LUMPED, RIGID
 from warp_contact.step.forces import apply_damping, apply_stiffness
 
 SAME = 1e-4  # of the size of a body: how far a vertex of an equal one may be
@@ -31,6 +31,9 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
         own = slice(start[b], start[b + 1])
         if fixed[own].all():
             continue
+        if model.materials[b].kernels is None:
+            kind[b] = int(RIGID)
+            continue
         kind[b] = int(HELD) if fixed[own].any() else int(FREE)
         for k in like.setdefault(_key(model, b), []):
             turn = _rotation(x[start[firsts[k]] : start[firsts[k] + 1]], x[own])
@@ -45,8 +48,8 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
     first = np.concatenate([[0], np.cumsum(blocks)]).astype(int)
     rest, inertia = np.zeros((model.n_vert, 3)), np.zeros((model.n_body, 3, 3))
     mass = model.mass.numpy().astype(float)
-    for b in np.flatnonzero(of_body >= 0):
-        like_it = slice(*start[firsts[of_body[b]] :][:2])
+    for b in np.flatnonzero(kind != int(LUMPED)):
+        like_it = slice(*start[firsts[of_body[b]] if of_body[b] >= 0 else b :][:2])
         own = slice(start[b], start[b + 1])
         r = x[like_it] - np.average(x[like_it], axis=0, weights=mass[like_it])
         rest[own] = r
@@ -76,7 +79,8 @@ class Inverses:
     def blocks(self, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Blocks (n, 3, 3) [1/kg] for steps ``h`` [s], shape after shape, and their norms (n,)."""
         if h not in self._kept:
-            found = [_inverse(h, *shape) for shape in self._shapes]
+            none = np.zeros((0, 3, 3)), np.zeros(0)  # all bodies are rigid
+            found = [none, *(_inverse(h, *shape) for shape in self._shapes)]
             blocks, norms = (np.concatenate(part) for part in zip(*found, strict=True))
             while len(self._kept) >= KEPT:
                 del self._kept[next(iter(self._kept))]

@@ -7,6 +7,8 @@ each shape.
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.frame import step_bounds
@@ -48,9 +50,14 @@ def choose(
     Raises:
         ValueError: the scene takes no implicit steps
     """
+    obstacle = _obstacle(model, response, sleeping)
+    rigid = _rigid(model)
+    if rigid:
+        if obstacle:
+            raise ValueError(f"body '{rigid}' is rigid and takes implicit steps: {obstacle}")
+        return Integrator(True, f"body '{rigid}' is rigid")
     if wanted == "explicit":
         return Integrator(False, "as asked for")
-    obstacle = _obstacle(model, response, sleeping)
     if wanted == "implicit":
         if obstacle:
             raise ValueError(f"integrator='implicit' is not possible: {obstacle}")
@@ -64,6 +71,13 @@ def choose(
     return Integrator(per_second > DEARER * step_bounds.RESOLVED, why)
 
 
+def _rigid(model: Model) -> str | None:
+    """A rigid body that can move, or None."""
+    free = np.maximum.reduceat(model.inv_mass.numpy(), model.body_vert.numpy()[:-1]) > 0.0
+    rigid = (model.labels[b] for b in np.flatnonzero(free) if model.materials[b].kernels is None)
+    return next(rigid, None)
+
+
 def _obstacle(model: Model, response, sleeping: bool) -> str:
     """Why implicit steps are not possible; empty if they are."""
     if not isinstance(response, ContactSurface) or response.search != "balanced":
@@ -74,6 +88,7 @@ def _obstacle(model: Model, response, sleeping: bool) -> str:
     free = model.inv_mass.numpy() > 0.0
     for body, label in enumerate(model.labels[: model.n_body]):
         n = int(start[body + 1] - start[body])
-        if n > LARGEST and free[start[body] : start[body + 1]].any():
+        soft = model.materials[body].kernels is not None
+        if soft and n > LARGEST and free[start[body] : start[body + 1]].any():
             return f"body '{label}' has {n} vertices, more than {LARGEST}: use a coarser mesh"
     return ""

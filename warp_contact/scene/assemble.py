@@ -138,7 +138,8 @@ def _elements(scene: Scene, tet0: np.ndarray) -> tuple[Elements, ...]:
     """The tets of the scene by material model, in the order of first use."""
     groups: dict = {}
     for body in scene.bodies:
-        groups.setdefault(body.material.kernels, []).append(body)
+        if body.material.kernels is not None:
+            groups.setdefault(body.material.kernels, []).append(body)
     out = []
     for kernels, bodies in groups.items():
         tet = np.concatenate([np.arange(tet0[b.index], tet0[b.index + 1]) for b in bodies])

@@ -2,8 +2,8 @@
 
 A model is one kernel file (``kernels/elastic/<model>.py``) and one class here with
 
-* ``kernels``: that file. It provides the kernels ``set_forces``, ``apply_stiffness``,
-  ``apply_damping`` and ``energies``. Their signatures are the same for all models except for
+* ``kernels``: that file, or None for a body that does not deform. It provides the kernels
+  ``set_forces``, ``apply_stiffness``, ``apply_damping`` and ``energies``. Their signatures are the same for all models except for
   ``param``, an array of ``ROW``: a Warp vector, or ``float`` where ``param`` has two dimensions;
 * ``density`` [kg/m^3] and ``damping`` [s];
 * ``parameters(vertices, tets)``: one row per tet, in the order in which the kernels read it;
@@ -133,6 +133,30 @@ class SpringNetwork:
             np.full((len(tets), 1), self.damping),
         ]
         return np.concatenate(row, axis=1).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """A body that does not deform; it makes all steps of its scene implicit.
+
+    Its mass and moments of inertia are those of its vertices, each with a quarter of its tets, as
+    for the other materials: a coarse mesh has somewhat larger moments than the solid.
+
+    Attributes:
+        density: [kg/m^3]
+    """
+
+    density: float
+    damping: ClassVar[float] = 0.0
+    kernels: ClassVar[ModuleType | None] = None
+
+    def __post_init__(self):
+        """As ``check``."""
+        self.check()
+
+    def check(self) -> None:
+        """Raise ValueError if the number makes no material."""
+        checks.number(self.density, "density", *DENSITY)
 
 
 def _multiplicity(tets: np.ndarray, parts: tuple) -> np.ndarray:

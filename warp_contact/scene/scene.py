@@ -7,6 +7,7 @@ import numpy as np
 
 from warp_contact import checks
 from warp_contact.scene import placement
+from warp_contact.scene.materials import Rigid
 from warp_contact.scene.mesh import TetMesh
 from warp_contact.scene.topology import HUGE
 
@@ -96,7 +97,7 @@ class Scene:
             rotation: quaternion (x, y, z, w), normalised here
             velocity: of all vertices, shape (3,), or of each, shape (n, 3) [m/s]
             fixed: True, a mask of shape (n,) or vertex ids: these follow their own velocity
-                whatever pushes them
+                whatever pushes them; all or none of a rigid body
             label: name, unique in the scene and no ``plane<index>``; by default ``body<index>``
             world: bodies of different worlds never touch
 
@@ -113,6 +114,8 @@ class Scene:
             x = mesh.vertices @ turn.T + checks.numbers(position, (3,), "position", HUGE)
             v = checks.vectors(velocity, n, "velocity", checks.FASTEST)
             mask, world = _mask(fixed, n), checks.count(world, "world", least=0)
+            if isinstance(material, Rigid) and mask.any() and not mask.all():
+                raise checks.refuse("fixed", fixed, "True or None for a rigid body")
             placement.check_shape(mesh, label)
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None

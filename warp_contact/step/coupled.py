@@ -116,7 +116,7 @@ def _find_rows(model: Model, work: Work) -> None:
     inputs = [c.graph, c.record, w.counted]
     outputs = [w.share, s.served, s.changed]
     launch_over(rows.find_shares, model.n_vert, inputs=inputs, outputs=outputs)
-    inputs = [c.graph, w.touched, w.share, w.bodies]
+    inputs = [c.graph, w.touched, w.share, w.x, w.bodies]
     launch_over(rows.find_rows, model.n_vert, inputs=inputs, outputs=[work.mobility.row])
 
 

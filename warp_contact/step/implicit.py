@@ -36,6 +36,8 @@ def drift(model: Model, state: State, work: Work, out: wp.array, turned: bool = 
     wp.launch(drifting.find_drift, model.n_body, inputs=inputs, outputs=[w.drift])
     inputs = [*given, w.bodies, w.of, w.drift, turned]
     wp.launch(drifting.advance, model.n_vert, inputs=inputs, outputs=[state.v, out])
+    if turned and w.any_rigid:
+        wp.launch(bodies.keep_shapes, model.n_body, inputs=[w.bodies], outputs=[out])
 
 
 def place(model: Model, x: wp.array, w: ImplicitWork) -> None:

@@ -9,8 +9,14 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.lengths import SEARCH_BOUND
+from warp_contact.kernels.mobility import Mobility
 from warp_contact.kernels.surface import region, search, spin
 from warp_contact.step.forces import internal_forces
+
+
+def soft(work: Work) -> Mobility:
+    """The mobilities of what deforms: rigid bodies have none, as the surface lies on their side."""
+    return work.implicit.soft if work.implicit else work.mobility
 
 
 def begin(model: Model, x: wp.array, work: Work, moves: wp.array) -> None:
@@ -23,7 +29,7 @@ def begin(model: Model, x: wp.array, work: Work, moves: wp.array) -> None:
     wp.launch(
         region.displacement_vectors,
         dim=model.n_vert,
-        inputs=[c.graph, c.record, s.residual, work.mobility, work.worlds, moves],
+        inputs=[c.graph, c.record, s.residual, soft(work), work.worlds, moves],
         outputs=[s.s],
     )
     wp.launch(region.touching_tets, dim=model.n_tet, inputs=[model.tets, s.s], outputs=[s.mask])

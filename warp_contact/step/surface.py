@@ -81,7 +81,7 @@ def _close(model: Model, state: State, work: Work, look: int, before: float, apa
         closure.begin_closure,
         work.capacity.contacts,
         inputs=[wp.vec3(before, apart, search.SEARCH_BOUND), c.n, c.record, c.constraint]
-        + [work.dt, s.residual, work.worlds],
+        + [work.dt, s.residual, work.worlds, search.soft(work)],
         outputs=[s.slack, s.push],
     )
     if work.implicit:

@@ -26,7 +26,8 @@ MAY = {  # room: those that it may import, beside itself
     "measure": {"kernels", "data", "scene", "step"},
     "usd": {"checks", "files"},
     "picture": {"kernels", "usd", "checks"},
-    "simulation": {"data", "scene", "step", "frame", "measure"}
+    "between_frames": {"data", "scene", "frame", "measure", "exclusive", "checks"},
+    "simulation": {"data", "scene", "step", "frame", "measure", "between_frames"}
     | {"errors", "progress", "exclusive", "checks"},
     "__init__": {"scene", "step", "measure", "usd", "simulation", "errors", "interrupts"},
     "command": {"__init__", "errors", "files", "interrupts", "progress", "scene", "step"}

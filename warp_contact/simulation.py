@@ -7,6 +7,7 @@ import numpy as np
 import warp as wp
 
 from warp_contact import checks
+from warp_contact.between_frames import BetweenFrames
 from warp_contact.exclusive import exclusively
 from warp_contact.frame import checkpoint, memory
 from warp_contact.frame.integrator import KINDS as INTEGRATORS
@@ -17,9 +18,8 @@ from warp_contact.measure.contact_fields import contact_fields
 from warp_contact.measure.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.scene.assemble import assemble
-from warp_contact.scene.scene import Body, Scene
+from warp_contact.scene.scene import Scene
 from warp_contact.scene.selection import Bodies
-from warp_contact.scene.topology import HUGE
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 RATES = 1e-6, 1e12  # of frames [1/s]
@@ -27,7 +27,7 @@ RESPONSES = ContactSurface | Penalty | PredictedForce
 KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce()"
 
 
-class Simulation:
+class Simulation(BetweenFrames):
     """Steps a scene frame by frame.
 
     Attributes:
@@ -154,60 +154,6 @@ class Simulation:
         with exclusively(self.device):
             self._stepper.step(self.frame + 1)
         self.frame += 1
-
-    def positions(self, body: Body | int | str | None = None) -> np.ndarray:
-        """Copy of the positions [m] of one body or of all, shape (n, 3)."""
-        return self.state.x.numpy()[self._bodies.range(body)].copy()
-
-    def velocities(self, body: Body | int | str | None = None) -> np.ndarray:
-        """Velocities [m/s] of one body or of all, at the time of the positions, shape (n, 3)."""
-        chosen = self._bodies.range(body)
-        with exclusively(self.device):
-            return self._stepper.velocities()[chosen]
-
-    def set_positions(self, body: Body | int | str | None, positions, vertices=None) -> None:
-        """Put vertices elsewhere between frames, as at the start of an episode.
-
-        This is no motion: nothing on the way is touched or counted, and velocities stay. Overlaps
-        at the new place are moved apart like those at the start of a run. All bodies wake.
-
-        Args:
-            body: the body; None for all
-            positions: shape (k, 3) for k vertices [m]
-            vertices: mask or ids within the body, or among all; None for all of them
-
-        Raises:
-            ValueError: there is no such body or vertex, or they are not finite or of that shape
-        """
-        x = self.state.x.numpy().copy()
-        part, chosen = self._bodies.choose(x, body, vertices)
-        of = "positions" if body is None else f"positions of body '{self._bodies.label(body)}'"
-        part[chosen] = checks.numbers(positions, part[chosen].shape, of, HUGE)
-        self._bodies.refuse_far(x, body)
-        with exclusively(self.device):
-            self._meter.tunnelling.follow(self.state.x)
-            self._stepper.set_positions(x, self._bodies.range(body))
-            own = self.model.vert_body.numpy()[self._bodies.range(body)]
-            self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
-
-    def set_velocity(self, body: Body | int | str, velocity, vertices=None) -> None:
-        """Set velocities [m/s] between frames; fixed vertices keep theirs from then on.
-
-        Args:
-            body: the body
-            velocity: shape (3,), or (k, 3) for k vertices
-            vertices: mask or ids within the body; None for all
-
-        Raises:
-            ValueError: there is no such body or vertex, or it is not finite or of that shape
-        """
-        v = np.zeros((self.model.n_vert, 3), dtype=np.float32)
-        part, chosen = self._bodies.choose(v, body, vertices)
-        of = f"velocity of body '{self._bodies.label(body)}'"
-        part[chosen] = checks.vectors(velocity, len(chosen), of, checks.FASTEST)
-        at = self._bodies.range(body).start + chosen
-        with exclusively(self.device):
-            self._stepper.set_velocities(v[at], at, self._bodies.index(body))
 
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Begin anew: the next frames give the bits of the first ones.

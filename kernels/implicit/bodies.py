@@ -44,6 +44,8 @@ class Implicit:
     centre: wp.array[wp.vec3]  # (n_body,) [m] of mass
     inv_total: wp.array[float]  # (n_body,) [1/kg] of its mass; 0 for a body that is held
     inv_inertia: wp.array[wp.mat33]  # (n_body,) [1/(kg m^2)]; 0 for a body that is held
+    force: wp.array[wp.vec3]  # (n_body,) [N] from outside
+    torque: wp.array[wp.vec3]  # (n_body,) [N m] from outside
 
 
 @wp.struct
@@ -76,6 +78,12 @@ def deforms(b: int, d: Implicit) -> bool:
 def rigid_at(i: int, b: int, x: wp.vec3, d: Implicit, motion: RigidMotion) -> wp.vec3:
     """Velocity [m/s] of the rigid motion of body b at its vertex i."""
     return motion.v[b] + wp.cross(motion.w[b], x - d.centre[b])
+
+
+@wp.func
+def acceleration(i: int, b: int, x: wp.vec3, d: Implicit) -> wp.vec3:
+    """By the force and torque from outside, at vertex i of body b [m/s^2]."""
+    return d.inv_total[b] * d.force[b] + wp.cross(d.inv_inertia[b] * d.torque[b], x - d.centre[b])
 
 
 @wp.func

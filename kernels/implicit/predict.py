@@ -17,6 +17,7 @@ from warp_contact.kernels.implicit.bodies import (
     HELD,
     Implicit,
     RigidMotion,
+    acceleration,
     floats,
     moves,
     rigid_at,
@@ -157,5 +158,22 @@ def kick(
         return
     u = dv[i]
     if floats(b, d):
-        u += d.h[0] * gravity - rigid_at(i, b, x[i], d, motion)
+        u += d.h[0] * (gravity + acceleration(i, b, x[i], d)) - rigid_at(i, b, x[i], d, motion)
     v[i] = v[i] + (dt[i] / d.h[0]) * u
+
+
+@wp.kernel
+def push(
+    # in
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    dt: wp.array[float],  # (n_vert,) [s]
+    part: float,  # of it
+    d: Implicit,
+    # in, out
+    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
+):
+    """One thread per vertex: let what acts from outside act for a part of the time dt."""
+    i = wp.tid()
+    b = d.vert_body[i]
+    if moves(b, d) and floats(b, d):
+        v[i] = v[i] + part * dt[i] * acceleration(i, b, x[i], d)

@@ -25,6 +25,7 @@ class Shapes:
         first: first block of each shape, and the number of all, shape (n_shape + 1,)
         rest: vertices of the shape of each body from its centre of mass [m], shape (n_vert, 3)
         inertia: moments of inertia about it [kg m^2], shape (n_body, 3, 3)
+        force, torque: that act on bodies from outside [N], [N m], shape (n_body,)
     """
 
     kind: np.ndarray
@@ -33,6 +34,8 @@ class Shapes:
     first: np.ndarray
     rest: np.ndarray
     inertia: np.ndarray
+    force: wp.array
+    torque: wp.array
 
 
 @dataclass
@@ -149,6 +152,7 @@ def _bodies(model: Model, shapes: Shapes, awake: Awake) -> Implicit:
     d.rest = wp.array(shapes.rest, dtype=wp.vec3)
     inverse = [np.linalg.inv(i) if i.any() else i for i in shapes.inertia]
     d.rest_inertia = wp.array(np.array(inverse), dtype=wp.mat33)
+    d.force, d.torque = shapes.force, shapes.torque
     d.turn = wp.zeros(model.n_vert, dtype=wp.mat33)
     d.centre = wp.zeros(n, dtype=wp.vec3)
     d.inv_total = wp.zeros(n, dtype=float)

@@ -125,3 +125,12 @@ def allocate_work(
         forces=contact_forces.allocate(n, capacity.pairs, unit),
         warm=warm_start.allocate(n, m),
     )
+
+
+def forget(work: Work) -> None:
+    """Clear what a step takes over from the last one."""
+    warm_start.forget(work.warm)
+    damping.forget(work.damping)
+    contact_forces.clear(work.forces)
+    work.contacts.n.zero_()
+    work.broad_phase.stale.fill_(1)

@@ -25,6 +25,7 @@ class Buffers:
         work: buffers, with the contacts of the last step; missing only while they are replaced
         response: how bodies respond to contact
         unit: resolution of the recorded contact impulses [N s]
+        shapes: of bodies that take implicit steps; None where none does
     """
 
     def __init__(
@@ -39,8 +40,8 @@ class Buffers:
         """Allocate on the current device; ``awake`` is what moves, None for everything."""
         self._worlds = worlds
         rest = state.x.numpy().astype(np.float64)
-        self._shapes = find_shapes(model, rest) if implicit else None
-        self._inverses = Inverses(model, self._shapes, rest) if implicit else None
+        self.shapes = find_shapes(model, rest) if implicit else None
+        self._inverses = Inverses(model, self.shapes, rest) if implicit else None
         self._step = 0.0
         self._model, self._state, self._awake = model, state, awake
         self.response = response
@@ -90,7 +91,7 @@ class Buffers:
         return self._graphs[key]
 
     def _allocate(self, capacity: Capacity) -> Work:
-        given = self._awake, self.unit, self._shapes
+        given = self._awake, self.unit, self.shapes
         work = allocate_work(self._model, self._state, capacity, *given)
         if self._step > 0.0:
             set_blocks(work.implicit, self._step, *self._inverses.blocks(self._step))

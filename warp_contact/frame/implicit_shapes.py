@@ -54,7 +54,8 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
         r = x[like_it] - np.average(x[like_it], axis=0, weights=mass[like_it])
         rest[own] = r
         inertia[b] = _inertia(mass[own], r)
-    return Shapes(kind, of_body, placed, first, rest, inertia)
+    wrench = (wp.zeros(model.n_body, dtype=wp.vec3) for _ in range(2))
+    return Shapes(kind, of_body, placed, first, rest, inertia, *wrench)
 
 
 class Inverses:

@@ -17,6 +17,7 @@ def values_of(stepper: Stepper) -> dict[str, np.ndarray]:
     groups = {"last": stepper.last.values(), "start": stepper.spectrum.starts()}
     groups |= {"warm": warm_start.values(work.warm), "damping": damping.values(work.damping)}
     groups["room"] = {"capacity": np.array(astuple(work.capacity))}
+    groups["wrench"] = stepper.wrench.values()
     if sleeping:
         groups["sleeping"] = sleeping.values(work)
     return checkpoint.ungroup(groups)
@@ -29,5 +30,6 @@ def restore(stepper: Stepper, values: dict[str, np.ndarray]) -> None:
     stepper.buffers.replace(Capacity(*values["room.capacity"].tolist()))
     warm_start.restore(stepper.work.warm, checkpoint.group(values, "warm"))
     damping.restore(stepper.work.damping, checkpoint.group(values, "damping"))
+    stepper.wrench.restore(checkpoint.group(values, "wrench")["last"])
     if stepper.sleeping:
         stepper.sleeping.restore(checkpoint.group(values, "sleeping"), stepper.work)

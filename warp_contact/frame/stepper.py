@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import warp as wp
 
-from warp_contact.data import contact_forces, contacts, damping, warm_start
+from warp_contact.data import contact_forces, contacts
 from warp_contact.data.damping import MOST
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
-from warp_contact.data.work import Work
+from warp_contact.data.work import Work, forget
 from warp_contact.errors import SimulationError
 from warp_contact.frame import between, step_bounds
 from warp_contact.frame.buffers import Buffers
@@ -26,6 +26,7 @@ from warp_contact.frame.spectrum import Spectrum
 from warp_contact.frame.step_count import StepCount
 from warp_contact.frame.turns import Turns, segments
 from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.wrench import Wrench
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.step.velocity import shift_velocities
 
@@ -45,6 +46,7 @@ class Stepper:
         buffers: what the steps fill
         sleeping: which bodies sleep; None where none may
         spectrum: finds the rates
+        wrench: what the user lets act on bodies
         worlds: those that take steps of their own
     """
 
@@ -71,6 +73,7 @@ class Stepper:
         self._turns = Turns(model, self.worlds, may_sleep)
         self.sleeping = Sleeping(model, state, fps, self._turns) if may_sleep else None
         self.buffers = Buffers(model, state, response, self._turns.awake, self.worlds, implicit)
+        self.wrench = Wrench(self.buffers.shapes)
         self._start, self._cut = FrameStart(state, self.work), False
         self._first_capacity = self.work.capacity
 
@@ -80,11 +83,10 @@ class Stepper:
         return self.buffers.work
 
     def step(self, frame: int) -> None:
-        """Step frame number ``frame``.
+        """Step frame number ``frame``, again from its start where steps or buffers were too short.
 
-        A frame that outgrew its buffers, or whose steps proved too long, is repeated from its
-        start. With nearly flat tets the rates are checked every ``PART`` steps. Whatever ends it
-        early leaves all as the last frame did; SimulationError says why no step is possible.
+        With nearly flat tets the rates are checked every ``PART`` steps. What ends it early leaves
+        all as the last frame did; SimulationError says why no step is possible.
         """
         self._begin()
         try:
@@ -102,14 +104,14 @@ class Stepper:
         old = self._overlapping & (self.work.surface.was_old.numpy() > 0)
         n = np.where(self._turns.idle, self.last.n, self._n)
         self.last = LastFrame(n, self._dt, old.astype(int), rates)
+        self.wrench.finish()
 
     def foresee(self, frame: int) -> int:
         """Steps that frame number ``frame`` will take if none proves too long."""
         return int(self._steps(self._rates(), self.last, frame).max())
 
     def _rates(self) -> np.ndarray:
-        kept = self.last.rates
-        return self.spectrum.rates(self._state.x) if kept is None else kept
+        return self.spectrum.rates(self._state.x) if self.last.rates is None else self.last.rates
 
     def _steps(self, rates: np.ndarray, last: LastFrame, frame: int) -> np.ndarray:
         of_bodies = self.spectrum.of_bodies[0]
@@ -203,12 +205,9 @@ class Stepper:
         self._state.x.assign(self.first[0])
         self._state.v.assign(self.first[1])
         self.last = none_yet(self.worlds.n)
+        self.wrench.clear()
         self.spectrum.start_from({})
-        warm_start.forget(self.work.warm)
-        damping.forget(self.work.damping)
-        contact_forces.clear(self.work.forces)
-        self.work.contacts.n.zero_()
-        self.work.broad_phase.stale.fill_(1)
+        forget(self.work)
         if self.sleeping:
             self.sleeping.wake_all(self.last.overlapping < 0, self.work)
 
@@ -258,6 +257,7 @@ class Stepper:
         lag = 0.5 * (self.last.dt - self._dt)[of_vert]
         shift_velocities(self._model, self._state, work, work.awake, lag)
         work.dt.assign(self._dt[of_vert].astype(np.float32))
+        self.wrench.begin(self._model, self._state, work)
         work.overflow.all.zero_()
         work.surface.was_old.zero_()
         work.worlds.apart.assign((~self._overlapping).astype(np.int32))

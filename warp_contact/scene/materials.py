@@ -3,8 +3,9 @@
 A model is one kernel file (``kernels/elastic/<model>.py``) and one class here with
 
 * ``kernels``: that file, or None for a body that does not deform. It provides the kernels
-  ``set_forces``, ``apply_stiffness``, ``apply_damping`` and ``energies``. Their signatures are the same for all models except for
-  ``param``, an array of ``ROW``: a Warp vector, or ``float`` where ``param`` has two dimensions;
+  ``set_forces``, ``apply_stiffness``, ``apply_damping`` and ``energies``. Their signatures are the
+  same for all models except for ``param``, an array of ``ROW``: a Warp vector, or ``float`` where
+  ``param`` has two dimensions;
 * ``density`` [kg/m^3] and ``damping`` [s];
 * ``parameters(vertices, tets)``: one row per tet, in the order in which the kernels read it;
 * ``check()``: raises ValueError with a reason.

@@ -87,6 +87,7 @@ class Scene:
         fixed=None,
         label: str | None = None,
         world: int = 0,
+        angular_velocity=(0.0, 0.0, 0.0),
     ) -> Body:
         """Place a copy of a rest shape: x = R vertices + position.
 
@@ -100,26 +101,20 @@ class Scene:
                 whatever pushes them; all or none of a rigid body
             label: name, unique in the scene and no ``plane<index>``; by default ``body<index>``
             world: bodies of different worlds never touch
+            angular_velocity: about the centre of mass, on top of ``velocity`` [rad/s]
 
         Raises:
             ValueError: naming the body, for input that cannot be simulated
         """
         label = self._new_label(label)
         try:
-            if not isinstance(mesh, TetMesh):
-                raise checks.refuse("mesh", mesh, "a TetMesh, such as wc.box(0.1, 2)")
-            _check_material(material)
-            n = len(mesh.vertices)
-            turn = rotation_matrix(rotation)
-            x = mesh.vertices @ turn.T + checks.numbers(position, (3,), "position", HUGE)
-            v = checks.vectors(velocity, n, "velocity", checks.FASTEST)
-            mask, world = _mask(fixed, n), checks.count(world, "world", least=0)
-            if isinstance(material, Rigid) and mask.any() and not mask.all():
-                raise checks.refuse("fixed", fixed, "True or None for a rigid body")
-            placement.check_shape(mesh, label)
+            _check_shape(mesh, material, label)
+            world = checks.count(world, "world", least=0)
+            x = _placed(mesh, position, rotation)
+            v = _velocities(mesh, x, velocity, angular_velocity)
+            mask = _mask(fixed, len(x), isinstance(material, Rigid))
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None
-        v = np.broadcast_to(v, (n, 3)).copy()
         body = Body(len(self.bodies), label, mesh, material, x, v, mask, world)
         self.bodies.append(body)
         self._labels.add(label)
@@ -161,18 +156,37 @@ def _unit(vector: np.ndarray, name: str) -> np.ndarray:
     return vector / length
 
 
-def _check_material(material) -> None:
-    """Raises ValueError for what is no material, and for a class that was not called."""
+def _check_shape(mesh, material, label: str) -> None:
+    """Raises ValueError for what is no mesh or no material, and for a class that was not called."""
+    if not isinstance(mesh, TetMesh):
+        raise checks.refuse("mesh", mesh, "a TetMesh, such as wc.box(0.1, 2)")
     if isinstance(material, type) or not callable(getattr(material, "check", None)):
         wanted = "a material, such as wc.NeoHookean(1e5, 0.4, 1000.0)"
         raise checks.refuse("material", material, wanted)
     material.check()
+    placement.check_shape(mesh, label)
 
 
-def _mask(fixed, n: int) -> np.ndarray:
+def _placed(mesh: TetMesh, position, rotation) -> np.ndarray:
+    turn = rotation_matrix(rotation)
+    return mesh.vertices @ turn.T + checks.numbers(position, (3,), "position", HUGE)
+
+
+def _velocities(mesh: TetMesh, x: np.ndarray, velocity, angular_velocity) -> np.ndarray:
+    """Velocities [m/s] of vertices at ``x``, shape (n, 3)."""
+    v = checks.vectors(velocity, len(x), "velocity", checks.FASTEST)
+    w = checks.numbers(angular_velocity, (3,), "angular_velocity", HUGE)
+    mass = np.bincount(mesh.tets.ravel(), np.repeat(mesh.volumes, 4), len(x))
+    v = v + np.cross(w, x - np.average(x, axis=0, weights=mass))
+    return checks.vectors(v, len(x), "velocity", checks.FASTEST)
+
+
+def _mask(fixed, n: int, rigid: bool) -> np.ndarray:
     mask = np.zeros(n, dtype=bool)
     if isinstance(fixed, bool | np.bool_):
         return mask | fixed
     if fixed is not None:
         mask[checks.vertex_ids(fixed, n, "fixed")] = True
+    if rigid and mask.any() and not mask.all():
+        raise checks.refuse("fixed", fixed, "True or None for a rigid body")
     return mask

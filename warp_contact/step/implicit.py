@@ -27,6 +27,14 @@ def kick(model: Model, state: State, work: Work) -> None:
     wp.launch(predict.kick, model.n_vert, inputs=inputs, outputs=[state.v])
 
 
+def push(model: Model, state: State, work: Work, part: float) -> None:
+    """Let forces and torques from outside act on ``state.v`` for a ``part`` of ``work.dt``."""
+    w = work.implicit
+    place(model, state.x, w)
+    inputs = [state.x, work.dt, part, w.bodies]
+    wp.launch(predict.push, model.n_vert, inputs=inputs, outputs=[state.v])
+
+
 def drift(model: Model, state: State, work: Work, out: wp.array, turned: bool = False) -> None:
     """Set ``out`` to x after ``work.dt``; with ``turned``, ``state.v`` to the velocities there."""
     w = work.implicit

@@ -1,0 +1,134 @@
+"""What a user reads and sets of a simulation between its frames."""
+
+import numpy as np
+
+from warp_contact import checks
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.exclusive import exclusively
+from warp_contact.frame.stepper import Stepper
+from warp_contact.measure.measure import Meter
+from warp_contact.scene.pose import pose_of
+from warp_contact.scene.scene import Body, Scene, rotation_matrix
+from warp_contact.scene.selection import Bodies
+from warp_contact.scene.topology import HUGE
+
+
+class BetweenFrames:
+    """Positions, velocities, poses and forces of the bodies of a simulation."""
+
+    scene: Scene
+    model: Model
+    state: State
+    device: object
+    _bodies: Bodies
+    _stepper: Stepper
+    _meter: Meter
+
+    def positions(self, body: Body | int | str | None = None) -> np.ndarray:
+        """Copy of the positions [m] of one body or of all, shape (n, 3)."""
+        return self.state.x.numpy()[self._bodies.range(body)].copy()
+
+    def velocities(self, body: Body | int | str | None = None) -> np.ndarray:
+        """Velocities [m/s] of one body or of all, at the time of the positions, shape (n, 3)."""
+        chosen = self._bodies.range(body)
+        with exclusively(self.device):
+            return self._stepper.velocities()[chosen]
+
+    def set_positions(self, body: Body | int | str | None, positions, vertices=None) -> None:
+        """Put vertices elsewhere between frames, as at the start of an episode.
+
+        This is no motion: nothing on the way is touched or counted, and velocities stay. Overlaps
+        at the new place are moved apart like those at the start of a run. All bodies wake.
+
+        Args:
+            body: the body; None for all
+            positions: shape (k, 3) for k vertices [m]
+            vertices: mask or ids within the body, or among all; None for all of them
+
+        Raises:
+            ValueError: there is no such body or vertex, or they are not finite or of that shape
+        """
+        x = self.state.x.numpy().copy()
+        part, chosen = self._bodies.choose(x, body, vertices)
+        of = "positions" if body is None else f"positions of body '{self._bodies.label(body)}'"
+        part[chosen] = checks.numbers(positions, part[chosen].shape, of, HUGE)
+        self._bodies.refuse_far(x, body)
+        with exclusively(self.device):
+            self._meter.tunnelling.follow(self.state.x)
+            self._stepper.set_positions(x, self._bodies.range(body))
+            own = self.model.vert_body.numpy()[self._bodies.range(body)]
+            self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
+
+    def set_velocity(self, body: Body | int | str, velocity, vertices=None) -> None:
+        """Set velocities [m/s] between frames; fixed vertices keep theirs from then on.
+
+        Args:
+            body: the body
+            velocity: shape (3,), or (k, 3) for k vertices
+            vertices: mask or ids within the body; None for all
+
+        Raises:
+            ValueError: there is no such body or vertex, or it is not finite or of that shape
+        """
+        v = np.zeros((self.model.n_vert, 3), dtype=np.float32)
+        part, chosen = self._bodies.choose(v, body, vertices)
+        of = f"velocity of body '{self._bodies.label(body)}'"
+        part[chosen] = checks.vectors(velocity, len(chosen), of, checks.FASTEST)
+        at = self._bodies.range(body).start + chosen
+        with exclusively(self.device):
+            self._stepper.set_velocities(v[at], at, self._bodies.index(body))
+
+    def pose(self, body: Body | int | str) -> tuple[np.ndarray, np.ndarray]:
+        """Position [m] and rotation (x, y, z, w) of a body: x = R vertices + position.
+
+        As given to ``add_body`` at the start; the nearest one of a body that has deformed.
+        """
+        own, mesh = self._bodies.range(body), self.scene.bodies[self._bodies.index(body)].mesh
+        mass = self.model.mass.numpy()[own].astype(np.float64)
+        return pose_of(self.positions(body).astype(np.float64), mesh.vertices, mass)
+
+    def set_pose(self, body: Body | int | str, position, rotation=(0.0, 0.0, 0.0, 1.0)) -> None:
+        """Put a body elsewhere between frames in its shape at rest, as ``set_positions`` does.
+
+        Args:
+            body: the body
+            position: translation of its mesh [m]
+            rotation: of its mesh, a quaternion (x, y, z, w)
+
+        Raises:
+            ValueError: there is no such body, or they are not finite or of that shape
+        """
+        mesh = self.scene.bodies[self._bodies.index(body)].mesh
+        moved = checks.numbers(position, (3,), "position", HUGE)
+        self.set_positions(body, mesh.vertices @ rotation_matrix(rotation).T + moved)
+
+    def apply(
+        self, body: Body | int | str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), at=None
+    ) -> None:
+        """Let a force and a torque act on a body during the next frame, beside those before.
+
+        A body that deforms takes them as a whole: every vertex has the same acceleration, and that
+        of the turning.
+
+        Args:
+            body: the body, without fixed vertices
+            force: [N]
+            torque: [N m]
+            at: point at which the force acts [m]; the centre of mass by default
+
+        Raises:
+            ValueError: there is no such body, it has fixed vertices, the steps are explicit, or a
+                number is not finite
+        """
+        index = self._bodies.index(body)
+        own = self._bodies.range(body)
+        force, torque = checks.numbers(force, (3,), "force"), checks.numbers(torque, (3,), "torque")
+        mass = self.model.mass.numpy()[own].astype(np.float64)
+        if at is not None:
+            centre = np.average(self.positions(body), axis=0, weights=mass)
+            torque = torque + np.cross(checks.numbers(at, (3,), "at", HUGE) - centre, force)
+        try:
+            self._stepper.wrench.add(index, force, torque)
+        except ValueError as error:
+            raise ValueError(f"body '{self._bodies.label(index)}': {error}") from None

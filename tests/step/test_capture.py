@@ -9,6 +9,7 @@ from warp_contact import (
     NeoHookean,
     Penalty,
     PredictedForce,
+    Rigid,
     Scene,
     Simulation,
     box,
@@ -38,18 +39,18 @@ FORBIDDEN = [
 ]
 
 
-def touching(overlap: float) -> Scene:
+def touching(overlap: float, upper=None) -> Scene:
     """Two blocks on a floor, on or in each other."""
     scene = Scene(friction=0.3)
     scene.add_plane((0.0, 0.0, 1.0), 0.0)
     rubber = NeoHookean(5e4, 0.3, 1000.0, 1e-3)
     scene.add_body(box(0.1, 2), rubber, (0.0, 0.0, 0.0501))
-    scene.add_body(box(0.1, 3), rubber, (0.01, 0.02, 0.1502 - overlap))
+    scene.add_body(box(0.1, 3), upper or rubber, (0.01, 0.02, 0.1502 - overlap))
     return scene
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.03])
-@pytest.mark.parametrize("name", RESPONSES)
+@pytest.mark.parametrize("name", [*RESPONSES, "implicit", "rigid"])
 def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap):
     captured = []
     take_steps = buffers.take_steps
@@ -68,6 +69,8 @@ def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap
         captured.append(args)
 
     monkeypatch.setattr(buffers, "take_steps", guarded)
-    sim = Simulation(touching(overlap), RESPONSES[name])
+    scene = touching(overlap, Rigid(1000.0) if name == "rigid" else None)
+    integrator = "explicit" if name in RESPONSES else "implicit"
+    sim = Simulation(scene, RESPONSES.get(name), integrator=integrator)
     assert any(sim.contact_fields()["pressure"].any() for _ in sim.frames(2))
     assert captured and np.isfinite(sim.positions()).all()

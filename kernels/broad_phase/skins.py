@@ -4,11 +4,13 @@ Pairs are found at the positions of some step and kept for many steps. As long a
 further from there than the skin of its body, the pairs include all contacts. Each step tests them
 exactly, so it finds the same contacts as with new pairs. New pairs are found once the predicted
 position of a vertex is further away than ``free``. The rest of the skin is a reserve for what
-impulses and the closure add within a step: they may stop the body, and its neighbours may push it.
-New pairs are also found when a body moves further than FASTER reserves in a step.
+impulses and the closure add within a step: they may turn the body back, and its neighbours may push
+it. New pairs are also found when a body moves further than FASTER reserves in a step.
 
-    free    = max(looks r, LEAST_SKIN e / 2) + (d - r) + D / 2   [m]
-    reserve = max(d, LEAST_SKIN e / 2) + D / 2                   [m]     skin = free + reserve
+    free    = max((looks - 1/2) r, LEAST_SKIN e / 2) + (d - r) / 2   [m]
+    reserve = max(d / 2, D - d / 2, LEAST_SKIN e / 2, free / 7)      [m]     skin = free + reserve
+
+Skins are around the middle of the way that the step is predicted to go: both its ends are d / 2 away.
 
 d is the largest predicted motion of the body in a step, D that of the bodies near it, e the
 shortest edge of its world. r is the motion that is left of d where contacts take the rest, as at
@@ -37,7 +39,9 @@ wp.set_module_options(OPTIONS)
 SHORTEST = wp.constant(1.0)  # steps
 LONGEST = wp.constant(32.0)  # steps
 MOTION_UNIT = wp.constant(1.0e4)  # counts of an edge: a sum of integers has no order
-FASTER = wp.constant(2.0)  # reserves in a step: the body was slower when its pairs were found
+FASTER = wp.constant(3.0)  # reserves in a step: the body was slower when its pairs were found
+PART = wp.constant(1.0 / 7.0)  # of what is free: the reserve is an eighth of the skin, see SURE
+ROUNDING = wp.constant(1.01)  # of what is free: a body that moves as predicted stays within it
 CAREFUL = wp.constant(0.99)  # part of a distance that is safe from rounding
 FADING = wp.constant(0.8)  # of a recorded motion from one detection pass to the next
 CHUNK = wp.constant(64)  # vertices reduced by one thread before it touches the maximum
@@ -65,6 +69,19 @@ def moved(
     fast = FASTER * (skin[vert_body[i]] - most)
     if not (d <= most * most and wp.length_sq(x1[i] - x0[i]) <= fast * fast):
         stale[0] = 1
+
+
+@wp.kernel
+def between(
+    # in
+    x0: wp.array[wp.vec3],  # (n_vert,) [m]
+    x1: wp.array[wp.vec3],  # (n_vert,) [m]
+    # out
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+):
+    """One thread per vertex: half way."""
+    i = wp.tid()
+    x[i] = x0[i] + 0.5 * (x1[i] - x0[i])
 
 
 @wp.kernel
@@ -191,8 +208,10 @@ def choose_skins(
                 push = wp.max(push, motion[other])
     if of.n_near[m] == 0:
         looks = LONGEST
-    free[m] = of_motion(rate[m], edge[m], looks) + motion[m] - rate[m] + 0.5 * push
-    skin[m] = free[m] + of_motion(motion[m], edge[m], 1.0) + 0.5 * push
+    later = wp.max((looks - 0.5) * rate[m], 0.5 * LEAST_SKIN * edge[m])
+    free[m] = ROUNDING * (later + 0.5 * (motion[m] - rate[m]))
+    reserve = wp.max(of_motion(motion[m], edge[m], 0.5), push - 0.5 * motion[m])
+    skin[m] = free[m] + wp.max(reserve, PART * free[m])
     stale[0] = 0
     any_pair[0] = 0
     age[0] = 0

@@ -86,7 +86,7 @@ def test_pairs_include_all_that_can_touch_before_a_skin_is_used_up(
     x0, own = state.x.numpy().astype(float), model.vert_body.numpy()
     broad_phase.refresh(model, state.x, wp.array(x0 + dt * state.v.numpy(), dtype=wp.vec3), work)
     b = work.broad_phase
-    skin = 0.999 * b.skin.numpy()  # rounding
+    skin, x0 = 0.999 * b.skin.numpy(), b.x.numpy().astype(float)  # rounding
     verts, edges = listed(b.verts), listed(b.edges)
     middle = np.array([x0[own == m].mean(axis=0) for m in range(8)])
     touching = 0
@@ -154,7 +154,7 @@ def test_a_fast_body_does_not_reach_for_others_with_its_own_skin(stages):
     # A few motions when the other one, at rest, is within 32 of them.
     assert none == none_either == 0
     assert 1.0 <= short < 8.0
-    assert long == pytest.approx(32.0, rel=1e-3)
+    assert 31.0 < long < 32.5
 
 
 def test_nothing_is_looked_for_where_no_body_is_near(stages, monkeypatch):
@@ -196,11 +196,11 @@ def test_what_has_become_fast_is_looked_at_anew(stages):
     b, own = work.broad_phase, (model.vert_body.numpy() == 0)[:, None]
     broad_phase.refresh(model, state.x, wp.array(x + dt * v * own, dtype=wp.vec3), work)
     assert b.free.numpy()[0] > 30.0 * dt * v[0]
-    for steps, anew in ((1.5, False), (3.0, True)):  # far less than is free
+    for steps, anew in ((1.5, False), (20.0, True)):  # less than is free
         x = x + 1e-4 * own
         ahead = wp.array(x + steps * dt * v * own, dtype=wp.vec3)
         broad_phase.refresh(model, wp.array(x, dtype=wp.vec3), ahead, work)
-        assert np.array_equal(b.x.numpy(), x.astype(np.float32)) == anew
+        assert (b.age.numpy()[0] == 0) == anew
 
 
 def test_pairs_kept_for_many_steps_give_the_same_bits_as_new_ones(pile, monkeypatch):

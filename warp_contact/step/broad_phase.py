@@ -43,6 +43,7 @@ def _find(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
     b = work.broad_phase
     b.drift.zero_()
     _move(model, x0, b.x, b.drift)
+    wp.launch(skins.between, dim=model.n_vert, inputs=[x0, x1], outputs=[b.x])
     for pairs in (b.verts, b.edges):
         wp.copy(pairs.travel.last, x0)
         pairs.travel.motion.zero_()

@@ -10,7 +10,7 @@ it. New pairs are also found when a body moves further than FASTER reserves in a
     free    = max((looks - 1/2) r, LEAST_SKIN e / 2) + (d - r) / 2   [m]
     reserve = max(d / 2, D - d / 2, LEAST_SKIN e / 2, free / 7)      [m]     skin = free + reserve
 
-Skins are around the middle of the way that the step is predicted to go: both its ends are d / 2 away.
+Skins are around the middle of the way that the step is predicted to go: its ends are d / 2 away.
 
 d is the largest predicted motion of the body in a step, D that of the bodies near it, e the
 shortest edge of its world. r is the motion that is left of d where contacts take the rest, as at

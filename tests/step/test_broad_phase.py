@@ -1,7 +1,6 @@
 """broad_phase.py: which bodies are near, and for how long what was found holds."""
 
 import numpy as np
-import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, Simulation, box

@@ -15,7 +15,7 @@ from warp_contact.step import sweeps
 from warp_contact.step.implicit import answer
 
 TOLERANCE = 1e-4  # of an edge: an approach in a step that needs another sweep
-SWEEPS = 40  # at most
+SWEEPS = 20  # at most: what is left is closed, and the next step starts from it
 PASSES = 40  # at most
 
 

@@ -27,14 +27,14 @@ EXACT = wp.constant(1.0e-4)  # a last change this small leaves an error of its s
 class Implicit:
     """What kernels know of the bodies that take implicit steps."""
 
-    h: wp.array[float]  # (1,) [s] length of the step that the blocks belong to
+    h: wp.array[float]  # (n_body,) [s] length of the step that its blocks belong to
     kind: wp.array[int]  # (n_body,)
     awake: wp.array[int]  # (n_body,) 0 asleep
     body_vert: wp.array[int]  # (n_body + 1,)
     vert_body: wp.array[int]  # (n_vert,)
     mass: wp.array[float]  # (n_vert,) [kg]
     inv_mass: wp.array[float]  # (n_vert,) [1/kg], 0 for a fixed vertex
-    first: wp.array[int]  # (n_body,) first block of its shape
+    first: wp.array[int]  # (n_body,) first block of its shape, for its step
     block: wp.array[wp.mat33]  # (n_block,) B_ij of the shapes, by rows [1/kg]
     norm: wp.array[float]  # (n_block,) spectral norms of (A0^-1)_ij [1/kg]
     rest: wp.array[wp.vec3]  # (n_vert,) [m] from the centre of mass at rest, as the shape was made

@@ -116,7 +116,7 @@ def load(
     b = d.vert_body[i]
     r[i] = wp.vec3(0.0, 0.0, 0.0)
     if d.inv_mass[i] > 0.0 and moves(b, d):
-        h = d.h[0]
+        h = d.h[b]
         s = h * f[i] - DAMPED * h * h * corner_sum(i, vt_start, vt_corner, stiff)
         if d.kind[b] == HELD:
             s += h * d.mass[i] * gravity
@@ -158,8 +158,8 @@ def kick(
         return
     u = dv[i]
     if floats(b, d):
-        u += d.h[0] * (gravity + acceleration(i, b, x[i], d)) - rigid_at(i, b, x[i], d, motion)
-    v[i] = v[i] + (dt[i] / d.h[0]) * u
+        u += d.h[b] * (gravity + acceleration(i, b, x[i], d)) - rigid_at(i, b, x[i], d, motion)
+    v[i] = v[i] + (dt[i] / d.h[b]) * u
 
 
 @wp.kernel

@@ -55,9 +55,10 @@ def multiply(
     if chosen.shape[0] > 0:
         if chosen[d.vert_body[i]] == 0:
             return
+    b = d.vert_body[i]
     product[i] = wp.vec3(0.0, 0.0, 0.0)
-    if d.inv_mass[i] > 0.0 and moves(d.vert_body[i], d):
-        h = d.h[0]
+    if d.inv_mass[i] > 0.0 and moves(b, d):
+        h = d.h[b]
         s = d.mass[i] * p[i] + h * h * corner_sum(i, vt_start, vt_corner, stiff)
         if damped.shape[0] > 0:
             s += h * corner_sum(i, vt_start, vt_corner, damped)
@@ -89,7 +90,7 @@ def begin(
     mass = wp.float64(0.0)
     for i in range(first, last):
         mass += wp.float64(d.mass[i])
-    speed = wp.float64(worlds.negligible[worlds.of_vert[first]] / d.h[0])
+    speed = wp.float64(worlds.negligible[worlds.of_vert[first]] / d.h[b])
     rz = inner(r, z, first, last)
     to.now[b] = rz
     to.enough[b] = wp.max(wp.float64(TOLERANCE * TOLERANCE) * rz, mass * speed * speed)

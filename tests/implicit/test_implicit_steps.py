@@ -199,3 +199,39 @@ def test_a_block_that_is_crushed_recovers_and_gains_no_energy():
     # It was pressed so hard that long steps would have turned it inside out, and it came back.
     assert most >= 32 and flattest < 0.3
     assert now.inverted == 0 and now.volume_ratio > 0.8 and sim.substeps <= 8
+
+
+def block_and_ball(scene, world: int) -> None:
+    """A block that falls onto another, tilted."""
+    material = wc.NeoHookean(1e5, 0.3, 1000.0, 1e-3)
+    scene.add_body(wc.box(0.1, 2), material, (0.0, 0.0, 0.051), world=world)
+    turned = np.array([0.1, 0.2, 0.05, 1.0]) / np.linalg.norm([0.1, 0.2, 0.05, 1.0])
+    place, down = (0.02, 0.01, 0.18), (0.0, 0.0, -1.0)
+    scene.add_body(wc.box(0.08, 2), material, place, turned, velocity=down, world=world)
+
+
+def fast(scene) -> None:
+    shot = wc.NeoHookean(1e5, 0.3, 1000.0, 1e-3)
+    scene.add_body(wc.box(0.1, 2), shot, (0.0, 0.0, 0.08), velocity=(0.0, 0.0, -9.0), world=7)
+
+
+def stiff(scene) -> None:
+    scene.add_body(wc.box(0.1, 3), wc.NeoHookean(1e11, 0.3, 7800.0), (0.0, 0.0, 0.07), world=7)
+
+
+def rigid(scene) -> None:
+    scene.add_body(wc.box(0.1, 2), wc.Rigid(1000.0), (0.0, 0.0, 0.07), world=7)
+
+
+@pytest.mark.parametrize("neighbour", [fast, stiff, rigid])
+def test_a_world_does_not_feel_its_neighbours(neighbour):
+    runs = []
+    for beside in (False, True):
+        scene = wc.Scene(friction=0.3)
+        scene.add_plane((0.0, 0.0, 1.0))
+        if beside:
+            neighbour(scene)
+        block_and_ball(scene, 3)
+        sim = wc.Simulation(scene, integrator="implicit")
+        runs.append([sim.positions()[-54:].copy() for _ in sim.frames(24)])
+    np.testing.assert_array_equal(*runs)

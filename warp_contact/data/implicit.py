@@ -21,7 +21,7 @@ class Shapes:
     Attributes:
         kind: of each body, see ``kernels/implicit/bodies.py``, shape (n_body,)
         of_body: number of the shape of each body, -1 for none, shape (n_body,)
-        placed: rotation of its shape when it was placed, shape (n_body, 3, 3)
+        placed: rotation of its mesh when it was placed, shape (n_body, 3, 3)
         first: first block of each shape, and the number of all, shape (n_shape + 1,)
         rest: vertices of the shape of each body from its centre of mass [m], shape (n_vert, 3)
         inertia: moments of inertia about it [kg m^2], shape (n_body, 3, 3)
@@ -131,23 +131,41 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
     )
 
 
-def set_blocks(work: ImplicitWork, h: float, blocks: np.ndarray, norms: np.ndarray) -> None:
-    """Set the blocks (n, 3, 3) [1/kg] of all shapes, and their norms (n,), for steps ``h`` [s]."""
-    work.bodies.h.fill_(h)
-    work.bodies.block.assign(blocks)
-    work.bodies.norm.assign(norms)
+def set_blocks(
+    work: ImplicitWork,
+    shapes: Shapes,
+    h: np.ndarray,
+    first: np.ndarray,
+    blocks: np.ndarray,
+    norms: np.ndarray,
+) -> bool:
+    """Set the blocks (n, 3, 3) [1/kg] of all shapes, one set for each length of the step.
+
+    ``norms`` are theirs (n,), ``h`` the step of each body [s], ``first`` where its set begins; both
+    (n_body,). Returns whether arrays had to be replaced by larger ones.
+    """
+    d = work.bodies
+    d.h.assign(h.astype(np.float32))
+    d.first.assign(first + np.where(shapes.of_body >= 0, shapes.first[shapes.of_body], 0))
+    larger = len(norms) > d.norm.shape[0]
+    if larger:
+        d.block = wp.array(blocks, dtype=wp.mat33)
+        d.norm = wp.array(norms, dtype=float)
+    elif len(norms):
+        d.block[: len(norms)].assign(blocks)
+        d.norm[: len(norms)].assign(norms)
+    return larger
 
 
 def _bodies(model: Model, shapes: Shapes, awake: Awake) -> Implicit:
     d, n = Implicit(), model.n_body
-    first = np.where(shapes.of_body >= 0, shapes.first[shapes.of_body], 0)
-    d.h = wp.ones(1, dtype=float)
+    d.h = wp.ones(n, dtype=float)
     d.kind = wp.array(shapes.kind, dtype=int)
     d.awake, d.body_vert, d.vert_body = awake.bodies, model.body_vert, model.vert_body
     d.mass, d.inv_mass = model.mass, model.inv_mass
-    d.first = wp.array(first, dtype=int)
-    d.block = wp.zeros(int(shapes.first[-1]), dtype=wp.mat33)
-    d.norm = wp.zeros(int(shapes.first[-1]), dtype=float)
+    d.first = wp.zeros(n, dtype=int)
+    n_block = int(shapes.first[-1])
+    d.block, d.norm = wp.zeros(n_block, dtype=wp.mat33), wp.zeros(n_block, dtype=float)
     d.placed = wp.array(shapes.placed, dtype=wp.mat33)
     d.rest = wp.array(shapes.rest, dtype=wp.vec3)
     inverse = [np.linalg.inv(i) if i.any() else i for i in shapes.inertia]

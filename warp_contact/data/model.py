@@ -6,6 +6,7 @@ All arrays are flat over the whole scene. A body is a range of vertices, tets an
 from dataclasses import dataclass
 from types import ModuleType
 
+import numpy as np
 import warp as wp
 
 
@@ -53,6 +54,7 @@ class Model:
         vert_body: body of each vertex, shape (n_vert,)
         mass: vertex masses [kg], shape (n_vert,)
         inv_mass: their inverses, 0 for a fixed vertex [1/kg], shape (n_vert,)
+        rest: vertices of the mesh of each body, as it was given [m], NumPy, shape (n_vert, 3)
         surf: ids of the surface vertices, ascending, shape (n_surf,)
         on_surface: 1 for a surface vertex, shape (n_vert,)
         tets: positively oriented, shape (n_tet,)
@@ -94,6 +96,7 @@ class Model:
     vert_body: wp.array
     mass: wp.array
     inv_mass: wp.array
+    rest: np.ndarray
     surf: wp.array
     on_surface: wp.array
     tets: wp.array

@@ -41,22 +41,32 @@ class Buffers:
         self._worlds = worlds
         rest = state.x.numpy().astype(np.float64)
         self.shapes = find_shapes(model, rest) if implicit else None
-        self._inverses = Inverses(model, self.shapes, rest) if implicit else None
-        self._step = 0.0
+        self._inverses = Inverses(model, self.shapes) if implicit else None
+        self._steps = np.zeros(0)  # of the bodies, that the mobilities are for [s]
         self._model, self._state, self._awake = model, state, awake
         self.response = response
         inv_mass = model.inv_mass.numpy()
         mobile = float(model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
         self.unit = IMPULSE_UNIT * (mobile if mobile > 0.0 else 1.0)
+        self._graphs: dict[tuple[int, bool], wp.Graph] = {}
         pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
         self.work: Work = self._allocate(Capacity(pairs=pairs))
-        self._graphs: dict[tuple[int, bool], wp.Graph] = {}
 
-    def set_step(self, dt: float) -> None:
-        """Let the mobilities of implicit steps be those of steps ``dt`` [s], if there are any."""
-        if self._inverses and dt not in (0.0, self._step):
-            set_blocks(self.work.implicit, dt, *self._inverses.blocks(dt))
-            self._step = dt
+    def set_steps(self, dt: np.ndarray) -> None:
+        """Let mobilities be those of steps ``dt`` [s] of the worlds, where steps are implicit."""
+        if self._inverses and dt.all():
+            steps = dt[self._worlds.of_body]
+            if not np.array_equal(steps, self._steps):
+                self._steps = steps
+                self._set_blocks(self.work)
+
+    def _set_blocks(self, work: Work) -> None:
+        lengths, which = np.unique(self._steps, return_inverse=True)
+        found = [self._inverses.blocks(float(h)) for h in lengths]
+        blocks, norms = (np.concatenate(part) for part in zip(*found, strict=True))
+        first = which * len(found[0][1])  # of the blocks of all shapes for the step of each body
+        if set_blocks(work.implicit, self.shapes, self._steps, first, blocks, norms):
+            self._graphs.clear()
 
     def use(self, work: Work) -> None:
         """Continue with other buffers."""
@@ -93,7 +103,7 @@ class Buffers:
     def _allocate(self, capacity: Capacity) -> Work:
         given = self._awake, self.unit, self.shapes
         work = allocate_work(self._model, self._state, capacity, *given)
-        if self._step > 0.0:
-            set_blocks(work.implicit, self._step, *self._inverses.blocks(self._step))
+        if len(self._steps):
+            self._set_blocks(work)
         damping.divide(work.damping, self._model, self._worlds.of_vert, self._worlds.n)
         return work

@@ -1,7 +1,7 @@
 """Shapes of bodies that take implicit steps, and the inverses of A0 that they share.
 
 A0 = M + h C0 + h^2 K0 belongs to a shape at rest, a material, what is fixed and a length of the
-step. Bodies that are equal but for a rigid motion share it.
+step. Copies of a mesh share it.
 """
 
 from dataclasses import replace
@@ -14,16 +14,18 @@ from warp_contact.data.model import Model
 from warp_contact.kernels.implicit.bodies import FREE, HELD, LUMPED, RIGID
 from warp_contact.step.forces import apply_damping, apply_stiffness
 
-SAME = 1e-4  # of the size of a body: how far a vertex of an equal one may be
-KEPT = 4  # lengths of steps of which the inverses are kept
+KEPT = 8  # lengths of steps of which the inverses are kept
 
 
 def find_shapes(model: Model, x: np.ndarray) -> Shapes:
-    """Which bodies take implicit steps, which are equal; ``x`` are rest positions (n_vert, 3)."""
+    """Which bodies take implicit steps, which are equal.
+
+    ``x`` are positions (n_vert, 3) at which all bodies have their shape at rest.
+    """
     kind = np.full(model.n_body, int(LUMPED))
     of_body = np.full(model.n_body, -1)
     placed = np.tile(np.eye(3), (model.n_body, 1, 1))
-    like: dict[tuple, list[int]] = {}
+    like: dict[tuple, int] = {}
     firsts: list[int] = []
     start = model.body_vert.numpy()
     fixed = model.inv_mass.numpy() == 0.0
@@ -35,23 +37,17 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
             kind[b] = int(RIGID)
             continue
         kind[b] = int(HELD) if fixed[own].any() else int(FREE)
-        for k in like.setdefault(_key(model, b), []):
-            turn = _rotation(x[start[firsts[k]] : start[firsts[k] + 1]], x[own])
-            if turn is not None:
-                of_body[b], placed[b] = k, turn
-                break
-        else:
-            of_body[b] = len(firsts)
-            like[_key(model, b)].append(len(firsts))
+        placed[b] = _rotation(model.rest[own], x[own])
+        of_body[b] = like.setdefault(_key(model, b), len(firsts))
+        if of_body[b] == len(firsts):
             firsts.append(b)
     blocks = [(start[b + 1] - start[b]) ** 2 for b in firsts]
     first = np.concatenate([[0], np.cumsum(blocks)]).astype(int)
     rest, inertia = np.zeros((model.n_vert, 3)), np.zeros((model.n_body, 3, 3))
     mass = model.mass.numpy().astype(float)
     for b in np.flatnonzero(kind != int(LUMPED)):
-        like_it = slice(*start[firsts[of_body[b]] if of_body[b] >= 0 else b :][:2])
         own = slice(start[b], start[b + 1])
-        r = x[like_it] - np.average(x[like_it], axis=0, weights=mass[like_it])
+        r = model.rest[own] - np.average(model.rest[own], axis=0, weights=mass[own])
         rest[own] = r
         inertia[b] = _inertia(mass[own], r)
     wrench = (wp.zeros(model.n_body, dtype=wp.vec3) for _ in range(2))
@@ -61,9 +57,9 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
 class Inverses:
     """The inverses of A0 of all shapes, for a few lengths of the step."""
 
-    def __init__(self, model: Model, shapes: Shapes, x: np.ndarray):
-        """Assemble stiffness and damping at rest; ``x`` are rest positions (n_vert, 3)."""
-        stiff, damped = _element_matrices(model, x)
+    def __init__(self, model: Model, shapes: Shapes):
+        """Assemble stiffness and damping at rest."""
+        stiff, damped = _element_matrices(model)
         start = model.body_vert.numpy()
         mass, inv_mass = model.mass.numpy().astype(float), model.inv_mass.numpy()
         self._shapes = []
@@ -95,25 +91,24 @@ def _key(model: Model, b: int) -> tuple:
     t0, t1 = model.body_tet.numpy()[b : b + 2]
     fixed = model.inv_mass.numpy()[v0:v1] == 0.0
     tets = model.tets.numpy()[t0:t1] - v0
-    return model.materials[b], fixed.tobytes(), tets.tobytes()
+    return model.materials[b], fixed.tobytes(), tets.tobytes(), model.rest[v0:v1].tobytes()
 
 
-def _rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray | None:
-    """The rotation that takes points a into b, shape (n, 3), or None where none does."""
-    p, q = a - a.mean(axis=0), b - b.mean(axis=0)
-    u, _, vt = np.linalg.svd(q.T @ p)
-    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    off = np.abs(q - p @ turn.T).max()
-    return turn if off <= SAME * np.abs(p).max() else None
+def _rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The rotation that takes points a into b, shape (n, 3)."""
+    u, _, vt = np.linalg.svd((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
+    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
 
 
-def _element_matrices(model: Model, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _element_matrices(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and damping of each tet at rest, shape (n_tet, 12, 12).
 
-    Each tet gets vertices of its own, so that twelve products give all columns.
+    Each tet gets vertices of its own, so that twelve products give all columns. They are where the
+    mesh has them: copies have the same bits, wherever they stand.
     """
-    apart = wp.array(x[model.tets.numpy()].reshape(-1, 3), dtype=wp.vec3)
-    of_tets = _with_own_vertices(model)
+    corners = model.rest[model.tets.numpy()]
+    apart = wp.array(corners.reshape(-1, 3), dtype=wp.vec3)
+    of_tets = _with_own_vertices(model, corners)
     out = np.zeros((2, model.n_tet, 12, 12))
     f = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
     for k in range(12):
@@ -127,9 +122,10 @@ def _element_matrices(model: Model, x: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return out[0], out[1]
 
 
-def _with_own_vertices(model: Model) -> Model:
-    corners = np.arange(4 * model.n_tet, dtype=np.int32).reshape(-1, 4)
-    return replace(model, tets=wp.array(corners, dtype=wp.vec4i))
+def _with_own_vertices(model: Model, corners: np.ndarray) -> Model:
+    own = wp.array(np.arange(4 * model.n_tet, dtype=np.int32).reshape(-1, 4), dtype=wp.vec4i)
+    pose = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+    return replace(model, tets=own, pose=wp.array(pose, dtype=wp.mat33))
 
 
 def _assemble(model: Model, b: int, matrices: np.ndarray) -> np.ndarray:

@@ -71,8 +71,7 @@ class StepCount:
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
         if self._implicit:
-            n = step_bounds.implicit_steps(omega, self._crossing(state), self.fps)
-            n = np.full(len(n), int(n.max()))  # an inverse belongs to one length of the step
+            n = step_bounds.implicit_steps(omega, self._crossing(state), self.fps).astype(int)
         w = int(n.argmax())
         if n[w] > self.most:
             body = int(np.where(self._worlds.of_body == w, of_bodies, -1.0).argmax())

@@ -179,7 +179,7 @@ class Stepper:
 
     def set_velocities(self, values: np.ndarray, at: np.ndarray, body: int) -> None:
         """Set ``values`` [m/s], shape (k, 3), at vertices ``at`` (k,) of a body."""
-        self.buffers.set_step(float(self.last.dt.max()))
+        self.buffers.set_steps(self.last.dt)
         between.set_velocities(self._model, self._state, self.work, self.last_dt, values, at)
         if self.sleeping:
             self.sleeping.wake(body)
@@ -228,7 +228,7 @@ class Stepper:
         return self.last.dt[self.worlds.of_vert]
 
     def _velocities(self) -> np.ndarray:
-        self.buffers.set_step(float(self.last.dt.max()))
+        self.buffers.set_steps(self.last.dt)
         apart = (self.last.overlapping == 0)[self.worlds.of_vert]
         given = self.work, self.last_dt, self.buffers.response, apart
         return between.velocities(self._model, self._state, *given)
@@ -252,7 +252,7 @@ class Stepper:
         if work.damping and stages_for(rates[1], self._dt) > MOST:
             wrong = too_damped(self._model, self.spectrum.of_bodies[1], self._dt)
             raise SimulationError(f"frame {frame}: {wrong}")
-        self.buffers.set_step(float(self._dt.max()))
+        self.buffers.set_steps(self._dt)
         damping_stages = prepare(work.damping, rates[1], self._dt, of_vert, self.last.dt)
         lag = 0.5 * (self.last.dt - self._dt)[of_vert]
         shift_velocities(self._model, self._state, work, work.awake, lag)

@@ -69,6 +69,7 @@ def _of_bodies(bodies: list) -> dict:
         "body_world": _ints([body.world for body in bodies]),
         "body_edge": _floats([length.mean() for length in lengths]),
         "body_thickness": _floats([_thickness(mesh) for mesh in meshes]),
+        "rest": np.concatenate([mesh.vertices for mesh in meshes]),
         "vert_body": _ints(np.repeat(np.arange(len(bodies)), np.diff(vert0))),
     }
 

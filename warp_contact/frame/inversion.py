@@ -43,7 +43,7 @@ class Inversion:
         if not self._implicit:
             return rates
         missing = self._missing(state)
-        worse = (missing > self._before) & (self._times < TIMES)
+        worse = ~(missing <= self._before) & ((self._times < TIMES) | ~np.isfinite(missing))
         kept = np.where(self._times > 0, KEPT, 0.0)
         kept = np.where(missing > 0.0, 1.0, kept)
         self._times += worse

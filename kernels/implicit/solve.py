@@ -3,20 +3,21 @@
     A(x) dv = r,   A = M + h C(x) + h^2 K(x)                                          [kg]
 
 The mobility G of mobility.py is the preconditioner. A is indefinite where tets are pressed hard;
-a body ends where a direction of negative curvature comes up. r . G r is about e . A e for an error
-e of dv, at least m e^2: a body ends where that is a negligible motion in a step, as in free flight.
+a body ends where a direction of negative curvature comes up. In free flight r is what rounding of
+positions by ROUNDING |x| does to forces, about (1 / G_ii - m_i) / h for each vertex: a body ends
+where r . G r is no larger than that.
 """
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import Implicit, moves
+from warp_contact.kernels.implicit.bodies import RIGID, Implicit, moves
 from warp_contact.kernels.motion.motion import corner_sum
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.worlds import Worlds
 
 wp.set_module_options(OPTIONS)
 
 TOLERANCE = wp.constant(1.0e-3)  # of the first residual, in the norm of G
+ROUNDING = wp.constant(2.5e-7)  # of a coordinate, in float32, and what follows from it
 ITERATIONS = wp.constant(16)  # at most: two are usual
 
 
@@ -71,7 +72,7 @@ def begin(
     r: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
     z: wp.array[wp.vec3],  # (n_vert,) [m/s] G r
     d: Implicit,
-    worlds: Worlds,
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     to: Iteration,
     p: wp.array[wp.vec3],  # (n_vert,) [m/s] the first direction, 0 where there is nothing to do
@@ -87,13 +88,18 @@ def begin(
         p[i] = wp.vec3(0.0, 0.0, 0.0)
     if not moves(b, d):
         return
-    mass = wp.float64(0.0)
-    for i in range(first, last):
-        mass += wp.float64(d.mass[i])
-    speed = wp.float64(worlds.negligible[worlds.of_vert[first]] / d.h[b])
+    noise = wp.float64(0.0)
+    if d.kind[b] != RIGID:
+        at = d.first[b]
+        n = last - first
+        for i in range(first, last):
+            g = d.norm[at + (i - first) * (n + 1)]
+            if g > 0.0:
+                p_i = (1.0 / g - d.mass[i]) / d.h[b] * ROUNDING * wp.length(x[i])
+                noise += wp.float64(g * p_i * p_i)
     rz = inner(r, z, first, last)
     to.now[b] = rz
-    to.enough[b] = wp.max(wp.float64(TOLERANCE * TOLERANCE) * rz, mass * speed * speed)
+    to.enough[b] = wp.max(wp.float64(TOLERANCE * TOLERANCE) * rz, noise)
     if rz > to.enough[b]:
         to.going[b] = 1
         wp.atomic_add(running, 0, 1)

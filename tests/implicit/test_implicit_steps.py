@@ -235,3 +235,19 @@ def test_a_world_does_not_feel_its_neighbours(neighbour):
         sim = wc.Simulation(scene, integrator="implicit")
         runs.append([sim.positions()[-54:].copy() for _ in sim.frames(24)])
     np.testing.assert_array_equal(*runs)
+
+
+def test_small_slow_motion_swings_back_in_short_steps():
+    """Each step changes a velocity by less than 1e-6 of an edge in a step."""
+
+    def swing(integrator):
+        scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+        block = wc.box(1.5, 2)
+        stretch = 0.02 * block.vertices * (1.0, 0.0, -1.0)
+        scene.add_body(block, wc.Corotated(400.0, 0.0, 1300.0), velocity=stretch)
+        sim = wc.Simulation(scene, fps=30, integrator=integrator, substeps=64)
+        return np.array([np.ptp(sim.positions()[:, 0]) for _ in sim.frames(150)]) - 1.5
+
+    exact, found = swing("explicit"), swing("implicit")
+    assert exact.min() < -0.5 * exact.max()  # it has swung back
+    assert np.abs(found - exact).max() < 0.02 * exact.max()

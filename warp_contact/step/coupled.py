@@ -12,7 +12,7 @@ from warp_contact.kernels.impulse import rows
 from warp_contact.kernels.impulse.impulse import Limits
 from warp_contact.kernels.surface import coupled_closure as closure
 from warp_contact.step import sweeps
-from warp_contact.step.implicit import answer
+from warp_contact.step.implicit import answer, place
 
 TOLERANCE = 1e-4  # of an edge: an approach in a step that needs another sweep
 SWEEPS = 20  # at most: what is left is closed, and the next step starts from it
@@ -54,6 +54,7 @@ def sweep_all(model: Model, v: wp.array, work: Work, look: int, extrapolation: f
 
 def close(model: Model, x: wp.array, work: Work, look: int) -> None:
     """Move ``x`` until no contact overlaps."""
+    place(model, x, work.implicit)  # bodies turn about where they are now
     w, c = work.implicit, work.contacts
     inputs = [c.n, c.record, work.surface.slack, x]
     outputs = [w.ahead, w.counted]

@@ -118,7 +118,7 @@ def _conjugate_gradients(model: Model, x: wp.array, work: Work) -> None:
     w.dv.zero_()
     w.running.zero_()
     answer(model, w.r, w.z, w)
-    inputs = [w.r, w.z, w.bodies, work.worlds]
+    inputs = [w.r, w.z, w.bodies, x]
     outputs = [w.iteration, w.p, w.running]
     wp.launch(solve.begin, model.n_body, inputs=inputs, outputs=outputs)
     while_any(w.running, _iterate, model, x, w)

@@ -249,5 +249,5 @@ def test_small_slow_motion_swings_back_in_short_steps():
         return np.array([np.ptp(sim.positions()[:, 0]) for _ in sim.frames(150)]) - 1.5
 
     exact, found = swing("explicit"), swing("implicit")
-    assert exact.min() < -0.5 * exact.max()  # it has swung back
+    assert exact.min() < -0.3 * exact.max()  # it has swung back
     assert np.abs(found - exact).max() < 0.02 * exact.max()

@@ -17,7 +17,8 @@ from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 KINDS = "explicit", "implicit", "auto"
 LARGEST = 800  # vertices of a body: its inverse takes 26 MB and seconds to find
-DEARER = 3.0  # time of an implicit step, in explicit ones
+DEARER = 3.0  # time of an implicit step, in explicit ones, of bodies of few vertices
+DENSE = 15.0  # vertices of a body that add as much as an explicit step: an inverse is dense
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,12 @@ def choose(
     spectrum = Spectrum(model)
     per_second = float(spectrum.rates(state.x)[0].max()) / (2.0 * step_bounds.SAFETY)
     stiffest = model.labels[int(spectrum.of_bodies[0].argmax())]
+    n = np.diff(model.body_vert.numpy()).astype(float)
+    as_dear = (DEARER + np.average(n, weights=n) / DENSE) * step_bounds.RESOLVED
     why = f"body '{stiffest}' would need {per_second:.0f} explicit steps a second"
-    return Integrator(per_second > DEARER * step_bounds.RESOLVED, why)
+    return Integrator(
+        per_second > as_dear, f"{why}, as dear as implicit ones from {as_dear:.0f} on"
+    )
 
 
 def _rigid(model: Model) -> str | None:

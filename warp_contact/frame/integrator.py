@@ -68,19 +68,21 @@ def choose(
     spectrum = Spectrum(model)
     per_second = float(spectrum.rates(state.x)[0].max()) / (2.0 * step_bounds.SAFETY)
     stiffest = model.labels[int(spectrum.of_bodies[0].argmax())]
-    n = np.diff(model.body_vert.numpy()).astype(float)
-    as_dear = (DEARER + np.average(n, weights=n) / DENSE) * step_bounds.RESOLVED
+    n = np.diff(model.body_vert.numpy())[_mobile(model)].astype(float)
+    dear = (DEARER + np.average(n, weights=n) / DENSE) * step_bounds.RESOLVED if len(n) else np.inf
     why = f"body '{stiffest}' would need {per_second:.0f} explicit steps a second"
-    return Integrator(
-        per_second > as_dear, f"{why}, as dear as implicit ones from {as_dear:.0f} on"
-    )
+    return Integrator(per_second > dear, f"{why}, as dear as implicit ones from {dear:.0f} on")
 
 
 def _rigid(model: Model) -> str | None:
     """A rigid body that can move, or None."""
-    free = np.maximum.reduceat(model.inv_mass.numpy(), model.body_vert.numpy()[:-1]) > 0.0
-    rigid = (model.labels[b] for b in np.flatnonzero(free) if model.materials[b].kernels is None)
-    return next(rigid, None)
+    mobile = np.flatnonzero(_mobile(model))
+    return next((model.labels[b] for b in mobile if model.materials[b].kernels is None), None)
+
+
+def _mobile(model: Model) -> np.ndarray:
+    """Bodies of which not all vertices are fixed, shape (n_body,)."""
+    return np.maximum.reduceat(model.inv_mass.numpy(), model.body_vert.numpy()[:-1]) > 0.0
 
 
 def _obstacle(model: Model, response, sleeping: bool) -> str:
@@ -89,11 +91,9 @@ def _obstacle(model: Model, response, sleeping: bool) -> str:
         return "only the balanced contact surface takes implicit steps"
     if sleeping:
         return "sleeping=True goes with explicit steps"
-    start = model.body_vert.numpy()
-    free = model.inv_mass.numpy() > 0.0
-    for body, label in enumerate(model.labels[: model.n_body]):
-        n = int(start[body + 1] - start[body])
-        soft = model.materials[body].kernels is not None
-        if soft and n > LARGEST and free[start[body] : start[body + 1]].any():
-            return f"body '{label}' has {n} vertices, more than {LARGEST}: use a coarser mesh"
+    for body in np.flatnonzero(_mobile(model)):
+        n = int(np.diff(model.body_vert.numpy())[body])
+        if model.materials[body].kernels is not None and n > LARGEST:
+            name = f"body '{model.labels[body]}'"
+            return f"{name} has {n} vertices, more than {LARGEST}: use a coarser mesh"
     return ""

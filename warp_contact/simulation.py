@@ -90,7 +90,7 @@ class Simulation(BetweenFrames):
         self.model, self.state = of = assemble(self.scene)
         self.scene.freeze()
         self._bodies = Bodies(self.model, self.scene)
-        self._integrator = choose(integrator, *of, self.response, sleeping)
+        self._integrator = choose(integrator, *of, self.response)
         load_kernels(self.model, self.device, self._integrator.implicit)
         settings = self.response, self.fps, substeps, max_substeps, sleeping
         self._stepper = Stepper(*of, *settings, self._integrator.implicit)

@@ -39,6 +39,7 @@ from warp_contact.kernels.worlds import DONE, LAST, Worlds
 
 wp.set_module_options(OPTIONS)
 
+USUAL = wp.constant(240.0)  # steps [1/s]: shorter ones allow as much velocity, not as much way
 RECOUNT = wp.constant(8)  # sweeps until contacts that no longer push are no longer counted
 
 
@@ -123,7 +124,9 @@ def solve_contacts(
             counted[c] = 0
         new = projected(before, u, un, excess, n, to, w)
         off = wp.abs(new.normal - before.ahead[3]) * w
-        if off * dt[at.vert[0]] > limits.tolerance * at.edge_length and sweep < limits.sweeps:
+        h = dt[at.vert[0]]
+        approach = limits.tolerance * wp.min(USUAL * h, 1.0) * at.edge_length
+        if off * h > approach and sweep < limits.sweeps:
             worlds.asking[world] = 1
         beta = float(0.0)
         if not last:
@@ -131,7 +134,7 @@ def solve_contacts(
         new.ahead = ahead_of(new, before, beta)
         change = add_to_parts(c, at, to, before.ahead, new.ahead, sweep, part, served)
         negligible = worlds.negligible[world]
-        busy[c] = wp.where(wp.length(change) * w * dt[at.vert[0]] > negligible, 2, 1)
+        busy[c] = wp.where(wp.length(change) * w * h > negligible, 2, 1)
         impulse[c] = new
 
 

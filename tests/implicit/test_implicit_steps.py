@@ -151,7 +151,6 @@ def one_block(**settings):
         ({"response": wc.Penalty(1e3)}, "only the balanced contact surface"),
         ({"response": wc.PredictedForce()}, "only the balanced contact surface"),
         ({"response": wc.ContactSurface(search="literal")}, "only the balanced contact surface"),
-        ({"sleeping": True}, "sleeping"),
     ],
 )
 def test_what_takes_no_implicit_steps_is_refused_with_its_reason(settings, reason):

@@ -226,9 +226,8 @@ def test_what_a_rigid_body_cannot_do_is_refused_by_name():
         wc.Scene().add_body(box, rigid, fixed=[0, 1], label="tool")
     scene = wc.Scene()
     scene.add_body(box, rigid, label="tool")
-    for settings in ({"response": wc.Penalty(1e3)}, {"sleeping": True}):
-        with pytest.raises(ValueError, match="'tool' is rigid"):
-            wc.Simulation(scene, **settings)
+    with pytest.raises(ValueError, match="'tool' is rigid"):
+        wc.Simulation(scene, wc.Penalty(1e3))
     with pytest.raises(ValueError, match="density"):
         wc.Rigid(-1.0)
     explicit = wc.Scene()
@@ -246,3 +245,33 @@ def test_a_fixed_rigid_body_needs_no_implicit_steps():
     for _ in sim.frames(10):
         pass
     assert sim.measure().overlap < 1e-5
+
+
+def test_what_rests_sleeps_until_something_comes_and_stays_where_it_was(tmp_path):
+    def run(sleeping, frames, load=None):
+        scene = wc.Scene(friction=0.5)
+        scene.add_plane((0.0, 0.0, 1.0))
+        soft = wc.NeoHookean(1e5, 0.3, 1000.0, 4e-3)
+        for k in range(4):
+            material, place = soft if k % 2 else wc.Rigid(1000.0), (0.3 * (k // 2), 0.0)
+            scene.add_body(wc.box(0.1, 2), material, (*place, 0.0501 + 0.1003 * (k % 2)))
+        scene.add_body(wc.box(0.08, 2), soft, (0.0, 0.0, 8.0), label="late")
+        sim = wc.Simulation(scene, sleeping=sleeping)
+        if load:
+            sim.load(load)
+        awake = []
+        for _ in sim.frames(frames):
+            awake.append(int(sim._stepper.work.awake.bodies.numpy().sum()))
+            if sim.frame == 66:
+                sim.save(tmp_path / "some_sleep.npz")
+        return sim, awake
+
+    sim, awake = run(True, 110)
+    fully, _ = run(False, 110)
+    # Both columns fall asleep, then the one that is struck wakes.
+    assert min(awake) == 1 and awake[-1] == 3
+    edge = sim.model.body_edge.numpy().min()
+    for body in (2, 3):  # the other column has been struck
+        assert np.abs(sim.positions(body) - fully.positions(body)).max() < 1e-2 * edge
+    again, _ = run(True, 44, tmp_path / "some_sleep.npz")
+    np.testing.assert_array_equal(again.positions(), sim.positions())

@@ -44,14 +44,13 @@ def choose(
     model: Model,
     state: State,
     response: ContactSurface | Penalty | PredictedForce,
-    sleeping: bool,
 ) -> Integrator:
     """The integrator that the user ``wanted``, or the cheaper one for ``auto``.
 
     Raises:
         ValueError: the scene takes no implicit steps
     """
-    obstacle = _obstacle(model, response, sleeping)
+    obstacle = _obstacle(model, response)
     rigid = _rigid(model)
     if rigid:
         if obstacle:
@@ -85,12 +84,10 @@ def _mobile(model: Model) -> np.ndarray:
     return np.maximum.reduceat(model.inv_mass.numpy(), model.body_vert.numpy()[:-1]) > 0.0
 
 
-def _obstacle(model: Model, response, sleeping: bool) -> str:
+def _obstacle(model: Model, response) -> str:
     """Why implicit steps are not possible; empty if they are."""
     if not isinstance(response, ContactSurface) or response.search != "balanced":
         return "only the balanced contact surface takes implicit steps"
-    if sleeping:
-        return "sleeping=True goes with explicit steps"
     for body in np.flatnonzero(_mobile(model)):
         n = int(np.diff(model.body_vert.numpy())[body])
         if model.materials[body].kernels is not None and n > LARGEST:

@@ -45,9 +45,12 @@ def paper(n: int, name: str, **arguments) -> Run:
     return frames(wc.Simulation(load(name).build(**arguments)), n)
 
 
-def run(n: int, *bodies: dict, response=None, fps=60, substeps=None, **around) -> Run:
+def run(
+    n: int, *bodies: dict, response=None, fps=60, substeps=None, integrator="explicit", **around
+) -> Run:
     """Bodies among what is ``around``: gravity, friction and planes."""
-    return frames(wc.Simulation(scene(*bodies, **around), response, fps, substeps), n)
+    given = response, fps, substeps
+    return frames(wc.Simulation(scene(*bodies, **around), *given, integrator=integrator), n)
 
 
 def slide() -> Run:
@@ -150,6 +153,12 @@ CRUSHED = (  # tets are pressed flat, and frames repeated
     body(wc.box(0.1, 2), HEAVY, 0.105, v=-2.0),
 )
 
+RIGID = (  # under a soft one, and on it
+    body(wc.box(0.1, 2), wc.Rigid(1000.0), 0.0501),
+    body(wc.box(0.1, 2), JELLY, (0.01, 0.0, 0.1503)),
+    body(wc.box(0.05, 2), wc.Rigid(2000.0), (0.0, 0.02, 0.27), TILT),
+)
+
 falling = partial(run, 15, *BLOCKS, planes=[UP], fps=120)
 RUNS: dict[str, Callable[[], Run]] = {
     "two_bodies": partial(paper, 6, "two_bodies"),
@@ -174,6 +183,11 @@ RUNS: dict[str, Callable[[], Run]] = {
     "crushed": partial(run, 12, *CRUSHED, planes=[UP]),
     "chosen": partial(run, 10, *BLOCKS, planes=[UP], friction=0.4, substeps=40),
     "pile": pile,
+    "implicit": partial(run, 20, *CORNERS, gravity=NONE, friction=0.4, integrator="implicit"),
+    "implicit_inside": partial(run, 10, *INSIDE, gravity=NONE, integrator="implicit"),
+    "implicit_crushed": partial(run, 8, *CRUSHED, planes=[UP], integrator="implicit"),
+    "implicit_crossed": partial(run, 20, *CROSSED, integrator="implicit"),
+    "rigid": partial(run, 30, *RIGID, planes=[UP], friction=0.5),
     "sheets": partial(paper, 10, "membrane_stack", count=3, gap=0.002),  # vertex on vertex
 }
 

@@ -16,7 +16,7 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-TOLERANCE = wp.constant(1.0e-2)  # of the first residual, in the norm of G: 1e-3 changes nothing
+TOLERANCE = wp.constant(1.0e-3)  # of the first residual, in the norm of G
 ROUNDING = wp.constant(2.5e-7)  # of a coordinate, in float32, and what follows from it
 ITERATIONS = wp.constant(16)  # at most: two are usual
 

@@ -251,7 +251,7 @@ def test_what_rests_sleeps_until_something_comes_and_stays_where_it_was(tmp_path
     def run(sleeping, frames, load=None):
         scene = wc.Scene(friction=0.5)
         scene.add_plane((0.0, 0.0, 1.0))
-        soft = wc.NeoHookean(1e5, 0.3, 1000.0, 4e-3)
+        soft = wc.NeoHookean(1e5, 0.3, 1000.0, 1e-2)
         for k in range(4):
             material, place = soft if k % 2 else wc.Rigid(1000.0), (0.3 * (k // 2), 0.0)
             scene.add_body(wc.box(0.1, 2), material, (*place, 0.0501 + 0.1003 * (k % 2)))

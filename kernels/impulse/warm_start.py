@@ -3,6 +3,9 @@
 A resting body needs almost the same impulses in every step. A vertex keeps the impulse of its first
 contact, with the body that it touches. An edge keeps all its contacts with their impulses
 (persistent.py). Where the normal has turned, the tangential impulse turns too.
+
+Implicit steps may change their length by half from frame to frame. They keep the impulses over it,
+as forces: those of a body at rest are then right for any step.
 """
 
 import warp as wp
@@ -43,6 +46,14 @@ def kept_of(p: Impulse) -> wp.vec4:
 
 
 @wp.func
+def unit_of(i: int, dt: wp.array[float]) -> float:
+    """What kept impulses are divided by: the step of vertex i [s], or 1 where ``dt`` is empty."""
+    if dt.shape[0] == 0:
+        return 1.0
+    return dt[i]
+
+
+@wp.func
 def is_first(c: int, n_vertex: int, contact: wp.array[Contact]) -> bool:
     """Whether contact c is the first of a vertex; they are sorted by vertex."""
     return c < n_vertex and (c == 0 or contact[c - 1].vert[0] != contact[c].vert[0])
@@ -53,6 +64,7 @@ def recall_vertices(
     # in
     threads: int,
     share: float,  # of the kept impulses: 1 for a whole step
+    dt: wp.array[float],  # (n_vert,) [s] where they are kept as forces, or empty
     n_vertex: wp.array[int],  # (1,) contacts of vertices
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -70,7 +82,8 @@ def recall_vertices(
         to = constraint[c]
         i = at.vert[0]
         if to.inv_mass > 0.0 and is_first(c, n_vertex[0], contact) and partner[i] == at.pair[1]:
-            impulse[c] = started(turned(share * kept[i], at.normal, to.friction, to.ramp))
+            last = share * unit_of(i, dt) * kept[i]
+            impulse[c] = started(turned(last, at.normal, to.friction, to.ramp))
         p = impulse[c].normal * at.normal + impulse[c].friction
         for k in range(5):
             part[5 * c + k] = part_of(k, at, to, p)
@@ -81,6 +94,7 @@ def recall_edges(
     # in
     threads: int,
     share: float,  # of the kept impulses: 1 for a whole step
+    dt: wp.array[float],  # (n_vert,) [s] where they are kept as forces, or empty
     again: bool,  # the contacts were listed once more: without new ones, a world just goes on
     worlds: Worlds,
     n_vertex: wp.array[int],  # (1,) contacts of vertices
@@ -96,7 +110,7 @@ def recall_edges(
     for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
         if constraint[c].inv_mass > 0.0:
             level = wp.vec3(0.0, 0.0, 0.0)
-            kept = share * found[source[c]].kept
+            kept = share * unit_of(contact[c].vert[0], dt) * found[source[c]].kept
             if not again or worlds.has_new[worlds.of_vert[contact[c].vert[0]]] > 0:
                 kept = turned(kept, contact[c].normal, constraint[c].friction, level)
             impulse[c] = started(kept)
@@ -106,6 +120,7 @@ def recall_edges(
 def keep_vertices(
     # in
     threads: int,
+    dt: wp.array[float],  # (n_vert,) [s] where they are kept as forces, or empty
     n_vertex: wp.array[int],  # (1,) contacts of vertices
     contact: wp.array[Contact],  # (capacity,)
     impulse: wp.array[Impulse],  # (capacity,)
@@ -119,13 +134,14 @@ def keep_vertices(
         if is_first(c, n, contact):
             i = contact[c].vert[0]
             partner[i] = contact[c].pair[1]
-            kept[i] = kept_of(impulse[c])
+            kept[i] = kept_of(impulse[c]) / unit_of(i, dt)
 
 
 @wp.kernel
 def keep_edges(
     # in
     threads: int,
+    dt: wp.array[float],  # (n_vert,) [s] where they are kept as forces, or empty
     look: int,  # worlds have swept where this look found an overlap: the others keep what they had
     worlds: Worlds,
     n_vertex: wp.array[int],  # (1,) contacts of vertices
@@ -145,6 +161,6 @@ def keep_edges(
     for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
         now = found[source[c]]
         if worlds.open[worlds.of_vert[contact[c].vert[0]]] >= look:
-            now.kept = kept_of(impulse[c])
+            now.kept = kept_of(impulse[c]) / unit_of(contact[c].vert[0], dt)
             found[source[c]] = now
         edges[c - n_vertex[0]] = now

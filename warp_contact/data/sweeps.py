@@ -15,12 +15,14 @@ class Sweeps:
             shape (contacts,)
         changed: the last sweep, if it changed the velocity of a vertex, else 0, shape (n_vert,)
         served: the last sweep that added anything to a vertex, shape (n_vert,)
+        no_dt: an empty array, for kept impulses that are not divided by a step
     """
 
     running: wp.array[int]
     busy: wp.array[int]
     changed: wp.array[int]
     served: wp.array[int]
+    no_dt: wp.array[float]
 
 
 def allocate(n_vert: int, n_contact: int) -> Sweeps:
@@ -30,4 +32,5 @@ def allocate(n_vert: int, n_contact: int) -> Sweeps:
         busy=wp.zeros(n_contact, dtype=int),
         changed=wp.zeros(n_vert, dtype=int),
         served=wp.zeros(n_vert, dtype=int),
+        no_dt=wp.zeros(0, dtype=float),
     )

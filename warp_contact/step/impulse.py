@@ -73,8 +73,9 @@ def exchange(model: Model, v: wp.array, work: Work, look: int = NO_LOOK) -> None
 def solve_half_step(model: Model, state: State, work: Work) -> None:
     """As ``solve`` for half a step, of which nothing is kept for the next one."""
     begin(model, state.x, work)
-    warm_start.recall_edges(work, share=0.5)
-    warm_start.recall_vertices(work, share=0.5)
+    share = 1.0 if work.implicit else 0.5  # implicit steps keep forces
+    warm_start.recall_edges(work, share)
+    warm_start.recall_vertices(work, share)
     apply(model, state.v, work)
     _sweep_all(model, state.v, work, NO_LOOK)
 

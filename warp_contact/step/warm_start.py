@@ -1,5 +1,7 @@
 """Warm start: the impulses start from those of the last step."""
 
+import warp as wp
+
 from warp_contact.data.launch import launch_over
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import warm_start as kernels
@@ -11,7 +13,8 @@ def recall_vertices(work: Work, share: float = 1.0) -> None:
     launch_over(
         kernels.recall_vertices,
         work.capacity.contacts,
-        inputs=[share, c.n_vertex, c.n, c.record, c.constraint, work.warm.partner, work.warm.kept],
+        inputs=[share, _unit(work), c.n_vertex, c.n, c.record, c.constraint]
+        + [work.warm.partner, work.warm.kept],
         outputs=[c.impulse, c.part],
     )
 
@@ -25,7 +28,7 @@ def recall_edges(work: Work, share: float = 1.0, again: bool = False) -> None:
     launch_over(
         kernels.recall_edges,
         work.capacity.contacts,
-        inputs=[share, again, work.worlds, c.n_vertex, c.n, c.record, c.constraint]
+        inputs=[share, _unit(work), again, work.worlds, c.n_vertex, c.n, c.record, c.constraint]
         + [n.source, n.found],
         outputs=[c.impulse],
     )
@@ -38,7 +41,7 @@ def keep_vertices(work: Work) -> None:
     launch_over(
         kernels.keep_vertices,
         work.capacity.contacts,
-        inputs=[c.n_vertex, c.record, c.impulse],
+        inputs=[_unit(work), c.n_vertex, c.record, c.impulse],
         outputs=[work.warm.partner, work.warm.kept],
     )
 
@@ -49,7 +52,7 @@ def keep_edges(work: Work, look: int) -> None:
     launch_over(
         kernels.keep_edges,
         work.capacity.contacts,
-        inputs=[look, work.worlds, c.n_vertex, c.n, c.record, n.source, c.impulse],
+        inputs=[_unit(work), look, work.worlds, c.n_vertex, c.n, c.record, n.source, c.impulse],
         outputs=[n.found, work.warm.edges, work.warm.n_edge],
     )
 
@@ -57,3 +60,8 @@ def keep_edges(work: Work, look: int) -> None:
 def forget_edges(work: Work) -> None:
     """The next step has no persistent contacts of edges."""
     work.warm.n_edge.zero_()
+
+
+def _unit(work: Work) -> wp.array:
+    """Steps over which impulses are kept as forces; empty where they are kept as they are."""
+    return work.dt if work.implicit else work.sweeps.no_dt

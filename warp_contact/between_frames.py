@@ -8,7 +8,7 @@ from warp_contact.data.state import State
 from warp_contact.exclusive import exclusively
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure.measure import Meter
-from warp_contact.scene.pose import pose_of
+from warp_contact.scene.pose import pose_of, rigid_motion_of
 from warp_contact.scene.scene import Body, Scene, rotation_matrix
 from warp_contact.scene.selection import Bodies
 from warp_contact.scene.topology import HUGE
@@ -54,6 +54,7 @@ class BetweenFrames:
         of = "positions" if body is None else f"positions of body '{self._bodies.label(body)}'"
         part[chosen] = checks.numbers(positions, part[chosen].shape, of, HUGE)
         self._bodies.refuse_far(x, body)
+        self._bodies.refuse_bent(x, body)
         with exclusively(self.device):
             self._meter.tunnelling.follow(self.state.x)
             self._stepper.set_positions(x, self._bodies.range(body))
@@ -91,6 +92,8 @@ class BetweenFrames:
     def set_pose(self, body: Body | int | str, position, rotation=(0.0, 0.0, 0.0, 1.0)) -> None:
         """Put a body elsewhere between frames in its shape at rest, as ``set_positions`` does.
 
+        It keeps the velocity of its centre of mass and its angular velocity, and no other motion.
+
         Args:
             body: the body
             position: translation of its mesh [m]
@@ -101,12 +104,19 @@ class BetweenFrames:
         """
         mesh = self.scene.bodies[self._bodies.index(body)].mesh
         moved = checks.numbers(position, (3,), "position", HUGE)
-        self.set_positions(body, mesh.vertices @ rotation_matrix(rotation).T + moved)
+        mass = self.model.mass.numpy()[self._bodies.range(body)].astype(np.float64)
+        v, w = rigid_motion_of(self.positions(body), self.velocities(body), mass)
+        x = mesh.vertices @ rotation_matrix(rotation).T + moved
+        self.set_positions(body, x)
+        if not self.scene.bodies[self._bodies.index(body)].fixed.any():
+            self.set_velocity(body, v + np.cross(w, x - np.average(x, axis=0, weights=mass)))
 
     def apply(
         self, body: Body | int | str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), at=None
     ) -> None:
         """Let a force and a torque act on a body during the next frame, beside those before.
+
+        It wakes. Where the frame fails, they act in the next one that does not.
 
         A body that deforms takes them as a whole: every vertex has the same acceleration, and that
         of the turning.
@@ -128,7 +138,10 @@ class BetweenFrames:
         if at is not None:
             centre = np.average(self.positions(body), axis=0, weights=mass)
             torque = torque + np.cross(checks.numbers(at, (3,), "at", HUGE) - centre, force)
-        try:
-            self._stepper.wrench.add(index, force, torque)
-        except ValueError as error:
-            raise ValueError(f"body '{self._bodies.label(index)}': {error}") from None
+        with exclusively(self.device):
+            try:
+                self._stepper.wrench.add(index, force, torque)
+            except ValueError as error:
+                raise ValueError(f"body '{self._bodies.label(index)}': {error}") from None
+            if self._stepper.sleeping:
+                self._stepper.sleeping.wake(index)

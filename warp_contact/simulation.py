@@ -176,6 +176,7 @@ class Simulation(BetweenFrames):
                 raise ValueError(f"no body is in world {world!r}")
             for body in np.flatnonzero(own == world):
                 part = self._bodies.range(int(body))
+                self._stepper.wrench.forget(int(body))
                 self.set_positions(int(body), x[part])
                 self.set_velocity(int(body), v[part])
 

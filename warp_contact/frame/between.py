@@ -9,6 +9,8 @@ from warp_contact.data.work import Work, everything
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.step.velocity import answer_of, shift_velocities, velocities_now
 
+ROUNDS = 24  # of halving what is left of a velocity
+
 
 def velocities(
     model: Model,
@@ -37,10 +39,17 @@ def set_velocities(
 
     ``dt`` is the last step of each vertex [s], shape (n_vert,).
     """
-    gained = State(state.x, wp.zeros(model.n_vert, dtype=wp.vec3))
-    shift_velocities(model, gained, work, everything(model), -0.5 * dt)
     v = state.v.numpy().copy()
-    v[at] = values + gained.v.numpy()[at]
+    if not work.implicit:
+        gained = State(state.x, wp.zeros(model.n_vert, dtype=wp.vec3))
+        shift_velocities(model, gained, work, everything(model), -0.5 * dt)
+        v[at] = values + gained.v.numpy()[at]
+        return state.v.assign(v)
+    v[at] = values
+    for _ in range(ROUNDS):  # what half a step adds depends on the velocity, by less than itself
+        now = State(state.x, wp.array(v, dtype=wp.vec3))
+        shift_velocities(model, now, work, everything(model), 0.5 * dt)
+        v[at] += values - now.v.numpy()[at]
     state.v.assign(v)
 
 

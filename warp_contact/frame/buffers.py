@@ -57,15 +57,16 @@ class Buffers:
         if self._inverses and dt.all():
             steps = dt[self._worlds.of_body]
             if not np.array_equal(steps, self._steps):
+                self._steps = np.zeros(0)  # an interrupt leaves none
+                self._set_blocks(self.work, steps)
                 self._steps = steps
-                self._set_blocks(self.work)
 
-    def _set_blocks(self, work: Work) -> None:
-        lengths, which = np.unique(self._steps, return_inverse=True)
+    def _set_blocks(self, work: Work, steps: np.ndarray) -> None:
+        lengths, which = np.unique(steps, return_inverse=True)
         found = [self._inverses.blocks(float(h)) for h in lengths]
         blocks, norms = (np.concatenate(part) for part in zip(*found, strict=True))
         first = which * len(found[0][1])  # of the blocks of all shapes for the step of each body
-        if set_blocks(work.implicit, self.shapes, self._steps, first, blocks, norms):
+        if set_blocks(work.implicit, self.shapes, steps, first, blocks, norms):
             self._graphs.clear()
 
     def use(self, work: Work) -> None:
@@ -104,6 +105,6 @@ class Buffers:
         given = self._awake, self.unit, self.shapes
         work = allocate_work(self._model, self._state, capacity, *given)
         if len(self._steps):
-            self._set_blocks(work)
+            self._set_blocks(work, self._steps)
         damping.divide(work.damping, self._model, self._worlds.of_vert, self._worlds.n)
         return work

@@ -10,7 +10,7 @@ from numpy.lib.recfunctions import repack_fields
 from warp_contact.data.model import Model
 from warp_contact.files import replacing
 
-FORMAT = 6
+FORMAT = 7
 
 
 def fingerprint(model: Model, *settings) -> str:
@@ -21,6 +21,7 @@ def fingerprint(model: Model, *settings) -> str:
     for elements in model.elements:
         digest.update(elements.kernels.__name__.encode())
         arrays += [elements.tet, elements.param]
+    digest.update(model.rest.tobytes())
     for array in arrays:
         digest.update(array.numpy().tobytes())
     return digest.hexdigest()

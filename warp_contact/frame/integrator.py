@@ -57,7 +57,7 @@ def choose(
             raise ValueError(f"body '{rigid}' is rigid and takes implicit steps: {obstacle}")
         return Integrator(True, f"body '{rigid}' is rigid")
     if wanted == "explicit":
-        return Integrator(False, "as asked for")
+        return Integrator(False, "the default")
     if wanted == "implicit":
         if obstacle:
             raise ValueError(f"integrator='implicit' is not possible: {obstacle}")

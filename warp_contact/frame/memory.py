@@ -30,6 +30,7 @@ def restore(stepper: Stepper, values: dict[str, np.ndarray]) -> None:
     stepper.buffers.replace(Capacity(*values["room.capacity"].tolist()))
     warm_start.restore(stepper.work.warm, checkpoint.group(values, "warm"))
     damping.restore(stepper.work.damping, checkpoint.group(values, "damping"))
-    stepper.wrench.restore(checkpoint.group(values, "wrench")["last"])
+    wrench = checkpoint.group(values, "wrench")
+    stepper.wrench.restore(wrench["last"], wrench["next"])
     if stepper.sleeping:
         stepper.sleeping.restore(checkpoint.group(values, "sleeping"), stepper.work)

@@ -19,6 +19,7 @@ class StepCount:
         fps: frames per second
         wanted: steps in a frame that the user chose, or None
         most: steps in a frame that are taken if the user chose none
+        wrench: what the user lets act on bodies
     """
 
     def __init__(
@@ -76,6 +77,9 @@ class StepCount:
         if n[w] > self.most:
             body = int(np.where(self._worlds.of_body == w, of_bodies, -1.0).argmax())
             cause = self._of_stiffness(state, body, omega[w])
+            if self._implicit:
+                per_second = self._crossing(state) / step_bounds.STRIDE
+                cause = f"{flattest_tet(self._model, state.x)} is crushed: a stiffer material helps"
             if per_second[w] > step_bounds.PATIENCE * omega[w]:  # the speed asks for them
                 cause = self._of_speed(state, w, speed[w])
             few = f"max_substeps={self.most}"
@@ -138,8 +142,9 @@ class StepCount:
         most, least, fastest = self._extremes(v)
         box = np.linalg.norm(np.maximum(most - mean, mean - least), axis=1)
         ball = fastest + np.linalg.norm(mean, axis=1)
-        gained = float(np.linalg.norm(self._model.gravity)) / self.fps
-        speed = np.minimum(box, ball) + spread + gained
+        gained = float(np.linalg.norm(self._model.gravity)) + self.wrench.accelerations()
+        own = self._worlds.most(gained)[self._worlds.of_body] / self.fps
+        speed = np.minimum(box, ball) + spread + own
         return self._worlds.most(speed / self._model.body_thickness.numpy())
 
     def _extremes(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -28,7 +28,6 @@ from warp_contact.frame.turns import Turns, segments
 from warp_contact.frame.worlds import Worlds
 from warp_contact.frame.wrench import Wrench
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
-from warp_contact.step.velocity import shift_velocities
 
 HALVED = 3  # times at most that a step is halved because state or stiffness is not finite
 PART = 8  # steps between two checks of the rates, in frames that begin or end with a flat tet
@@ -73,7 +72,7 @@ class Stepper:
         self._turns = Turns(model, self.worlds, may_sleep)
         self.sleeping = Sleeping(model, state, fps, self._turns) if may_sleep else None
         self.buffers = Buffers(model, state, response, self._turns.awake, self.worlds, implicit)
-        self.wrench = Wrench(self.buffers.shapes)
+        self.wrench = self._step_count.wrench = Wrench(self.buffers.shapes, model)
         self._start, self._cut = FrameStart(state, self.work), False
         self._first_capacity = self.work.capacity
 
@@ -180,9 +179,9 @@ class Stepper:
     def set_velocities(self, values: np.ndarray, at: np.ndarray, body: int) -> None:
         """Set ``values`` [m/s], shape (k, 3), at vertices ``at`` (k,) of a body."""
         self.buffers.set_steps(self.last.dt)
-        between.set_velocities(self._model, self._state, self.work, self.last_dt, values, at)
         if self.sleeping:
             self.sleeping.wake(body)
+        between.set_velocities(self._model, self._state, self.work, self.last_dt, values, at)
 
     def set_positions(self, x: np.ndarray, at: slice) -> None:
         """Set positions [m], shape (n_vert, 3), of vertices ``at``; others stay.
@@ -239,14 +238,13 @@ class Stepper:
         Return what ``rates_now`` finds at the end, which comes as soon as the steps of worlds
         ``in_parts`` no longer fit, or where buffers were too small.
         """
-        work, of_vert = self.work, self.worlds.of_vert
+        work, of_vert, idle = self.work, self.worlds.of_vert, self._turns.idle
         self._turns.let_all(work)
         if self.sleeping:
             self.sleeping.begin_frame(self._state, work)
         else:
             contact_forces.clear(work.forces)
         now = replace(self.last, overlapping=self._overlapping.astype(int))
-        idle = self._turns.idle
         self._n = np.where(idle, 0, self._steps(rates, now, frame))
         self._dt = np.where(idle, self.last.dt, 1.0 / (self.fps * np.maximum(self._n, 1)))
         if work.damping and stages_for(rates[1], self._dt) > MOST:
@@ -255,7 +253,7 @@ class Stepper:
         self.buffers.set_steps(self._dt)
         damping_stages = prepare(work.damping, rates[1], self._dt, of_vert, self.last.dt)
         lag = 0.5 * (self.last.dt - self._dt)[of_vert]
-        shift_velocities(self._model, self._state, work, work.awake, lag)
+        self.wrench.shift(self._model, self._state, work, lag)
         work.dt.assign(self._dt[of_vert].astype(np.float32))
         self.wrench.begin(self._model, self._state, work)
         work.overflow.all.zero_()
@@ -290,6 +288,7 @@ class Stepper:
         """Leave the frame as if it had not begun, wherever it was interrupted."""
         self.last = self._before
         self.spectrum.remind(self._memory)
+        self.wrench.undo()
         self._put_back()
         if self.sleeping:
             self.sleeping.undo()

@@ -8,6 +8,7 @@ from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.implicit.bodies import FREE, RIGID
 from warp_contact.step.implicit import push
+from warp_contact.step.velocity import shift_velocities
 
 
 class Wrench:
@@ -17,11 +18,14 @@ class Wrench:
     half a step at its old value and half a step at its new one.
     """
 
-    def __init__(self, shapes: Shapes | None):
+    def __init__(self, shapes: Shapes | None, model: Model):
         """Nothing acts; ``shapes`` hold what the kernels read, None where steps are explicit."""
-        self._shapes = shapes
-        n = len(shapes.kind) if shapes else 0
+        self._shapes, self._of_vert = shapes, model.vert_body.numpy()
+        n = model.n_body
+        self._mass = np.bincount(self._of_vert, model.mass.numpy(), n)
+        self._fixed = np.bincount(self._of_vert, model.inv_mass.numpy(), n) == 0.0
         self._last, self._next = np.zeros((2, 2, n, 3))
+        self._kept = self._last, self._next
 
     def add(self, body: int, force: np.ndarray, torque: np.ndarray) -> None:
         """Let a force [N] and a torque [N m] act on body ``body`` in the next frame.
@@ -29,16 +33,35 @@ class Wrench:
         Raises:
             ValueError: steps are explicit, or the body has fixed vertices
         """
+        if self._fixed[body]:
+            raise ValueError("it is fixed: give it a velocity")
         if not self._shapes:
             raise ValueError("apply goes with integrator='implicit'")
         if self._shapes.kind[body] not in (int(FREE), int(RIGID)):
             raise ValueError("it has fixed vertices: give them a velocity")
         self._next[:, body] += force, torque
 
+    def shift(self, model: Model, state: State, work: Work, lag: np.ndarray) -> None:
+        """Shift velocities by ``lag`` [s], shape (n_vert,), while what acted last still acts."""
+        self._kept = self._last, self._next
+        if self._shapes:
+            self._assign(self._last)
+        shift_velocities(model, state, work, work.awake, lag)
+
+    def accelerations(self) -> np.ndarray:
+        """How fast what acts in the next frame makes each body [m/s^2] at most, (n_body,)."""
+        force, torque = np.linalg.norm(self._next, axis=2)
+        if not self._shapes or not self._next.any():
+            return force
+        arm = np.zeros(len(force))
+        np.maximum.at(arm, self._of_vert, np.linalg.norm(self._shapes.rest, axis=1))
+        least = np.linalg.eigvalsh(self._shapes.inertia)[:, 0]
+        turns = np.divide(torque * arm, least, out=np.zeros(len(force)), where=torque > 0.0)
+        return force / self._mass + turns
+
     def begin(self, model: Model, state: State, work: Work) -> None:
         """Let what acts in the next frame replace what acted in the last one."""
         if self._shapes and (self._last != self._next).any():
-            self._assign(self._last)
             push(model, state, work, 0.5)
             self._assign(self._next)
             push(model, state, work, -0.5)
@@ -47,17 +70,27 @@ class Wrench:
         """End the frame."""
         self._last, self._next = self._next, np.zeros_like(self._next)
 
+    def undo(self) -> None:
+        """Leave all as if the frame had not begun; what was to act in it, still is."""
+        self._last, self._next = self._kept
+        if self._shapes:
+            self._assign(self._last)
+
+    def forget(self, body: int) -> None:
+        """Nothing is to act on a body in the next frame."""
+        self._next[:, body] = 0.0
+
     def clear(self) -> None:
         """Nothing acts, as before the first frame."""
-        self.restore(np.zeros_like(self._last))
+        self.restore(*np.zeros((2, *self._last.shape)))
 
     def values(self) -> dict[str, np.ndarray]:
         """What a checkpoint needs."""
-        return {"last": self._last}
+        return {"last": self._last, "next": self._next}
 
-    def restore(self, last: np.ndarray) -> None:
+    def restore(self, last: np.ndarray, following: np.ndarray) -> None:
         """Take over what ``values`` gave."""
-        self._last, self._next = last, np.zeros_like(last)
+        self._last, self._next = last, following
         if self._shapes:
             self._assign(last)
 

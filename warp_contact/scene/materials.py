@@ -141,7 +141,10 @@ class Rigid:
     """A body that does not deform; it makes all steps of its scene implicit.
 
     Its mass and moments of inertia are those of its vertices, each with a quarter of its tets, as
-    for the other materials: a coarse mesh has somewhat larger moments than the solid.
+    for the other materials: a coarse mesh has larger moments than the solid, a box of n cells along
+    an edge 1 + 2 / n^2 times, a ball of 300 vertices 1.03 times. All its velocities are a rigid
+    motion: others that are set become the one with the same momenta in the next frame. While fixed,
+    its vertices follow the velocities that they are given.
 
     Attributes:
         density: [kg/m^3]

@@ -23,3 +23,16 @@ def quaternion(turn: np.ndarray) -> np.ndarray:
     k += [[g + c, h + f, i - a - e, d - b], [h - f, c - g, d - b, a + e + i]]
     q = np.linalg.eigh(np.array(k) / 3.0)[1][:, -1]
     return np.where(q[3] < 0.0, -q, q)
+
+
+def rigid_motion_of(
+    x: np.ndarray, v: np.ndarray, mass: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity [m/s] of the centre of mass and angular velocity [rad/s], each of shape (3,).
+
+    Those of a rigid body at ``x`` (n, 3) with the momenta of the velocities ``v`` (n, 3).
+    """
+    x, v = x.astype(np.float64), v.astype(np.float64)
+    r, mean = x - np.average(x, axis=0, weights=mass), np.average(v, axis=0, weights=mass)
+    inertia = (mass * (r * r).sum(axis=1)).sum() * np.eye(3) - (mass[:, None] * r).T @ r
+    return mean, np.linalg.solve(inertia, (mass[:, None] * np.cross(r, v)).sum(axis=0))

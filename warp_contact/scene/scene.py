@@ -113,6 +113,9 @@ class Scene:
             x = _placed(mesh, position, rotation)
             v = _velocities(mesh, x, velocity, angular_velocity)
             mask = _mask(fixed, len(x), isinstance(material, Rigid))
+            if mask.any() and np.any(angular_velocity):
+                wanted = "zero where vertices are fixed: these go straight, give them targets"
+                raise checks.refuse("angular_velocity", angular_velocity, wanted)
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None
         body = Body(len(self.bodies), label, mesh, material, x, v, mask, world)

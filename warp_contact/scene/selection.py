@@ -7,7 +7,10 @@ import numpy as np
 from warp_contact import checks
 from warp_contact.data.model import Model
 from warp_contact.scene import placement
-from warp_contact.scene.scene import Body, Scene
+from warp_contact.scene.pose import pose_of
+from warp_contact.scene.scene import Body, Scene, rotation_matrix
+
+SAME = 1e-3  # of the size of a rigid body: how far its vertices may be from its shape
 
 
 class Bodies:
@@ -53,6 +56,17 @@ class Bodies:
         name = f"vertices of {of}"
         every = np.arange(len(part))
         return part, every if vertices is None else checks.vertex_ids(vertices, len(part), name)
+
+    def refuse_bent(self, x: np.ndarray, body) -> None:
+        """Raise ValueError where a rigid body, or any, would not have its shape."""
+        for b in range(self._model.n_body) if body is None else [self.index(body)]:
+            mesh, own = self._scene.bodies[b].mesh, x[self.range(b)].astype(np.float64)
+            if self._model.materials[b].kernels is None:
+                place, turn = pose_of(own, mesh.vertices, np.ones(len(own)))
+                off = np.abs(own - mesh.vertices @ rotation_matrix(turn).T - place).max()
+                if off > SAME * np.ptp(mesh.vertices, axis=0).max():
+                    name = f"body '{self._model.labels[b]}' is rigid"
+                    raise ValueError(f"{name}: positions change its shape; use set_pose")
 
     def refuse_far(self, x: np.ndarray, body) -> None:
         """Raise ValueError where one body, or any, is further away than a scene may have it."""

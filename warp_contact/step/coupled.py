@@ -15,7 +15,7 @@ from warp_contact.step import sweeps
 from warp_contact.step.implicit import answer, place
 
 TOLERANCE = 1e-4  # of an edge: an approach in a step that needs another sweep
-SWEEPS = 20  # at most: what is left is closed, and the next step starts from it
+SWEEPS = 100  # at most: a heavy body on a light one needs most
 PASSES = 40  # at most
 
 

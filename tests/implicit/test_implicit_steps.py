@@ -211,7 +211,8 @@ def block_and_ball(scene, world: int) -> None:
 
 def fast(scene) -> None:
     shot = wc.NeoHookean(1e5, 0.3, 1000.0, 1e-3)
-    scene.add_body(wc.box(0.1, 2), shot, (0.0, 0.0, 0.08), velocity=(0.0, 0.0, -9.0), world=7)
+    scene.add_body(wc.box(0.1, 2), shot, (0.0, 0.0, 2.0), velocity=(9.0, 0.0, 0.0), world=7)
+    scene.add_body(wc.box(0.1, 2), shot, (0.0, 0.0, 5.0), world=7, fixed=True)  # 24 steps a frame
 
 
 def stiff(scene) -> None:

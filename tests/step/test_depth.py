@@ -260,7 +260,7 @@ def test_depths_are_those_of_the_published_formulas(
         reference = Reference(model, state.x.numpy().astype(float), inside, body).depths()
         for i, (d, r) in reference.items():
             off.append((abs(found[i, body][1] - d), np.abs(found[i, body][2] - r).max()))
-    # Weights 1 / gap^2 carry the rounding of a gap of a thousandth of an edge, or now and then less.
+    # Weights 1 / gap^2 carry the rounding of a gap of a thousandth of an edge, now and then less.
     assert len(off) > 20
     depth_off, turned_off = np.sort(off, axis=0).T
     assert depth_off[-3] < 1e-4 and turned_off[-3] < 2e-3

@@ -1,6 +1,6 @@
 """Bodies that take implicit steps: their present shape, as far as their mobility depends on it.
 
-    R_i F_i = polar part,  F_i = sum of volume times deformation gradient of the tets of vertex i
+    R_i = polar part of F_i,  F_i = sum of volume times deformation gradient of its tets     [m^3]
     M_r = U^T M U                               mass and moments of inertia          [kg], [kg m^2]
 
 R_i turns the rest shape into the present one around vertex i. U are the rigid motions.

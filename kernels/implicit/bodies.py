@@ -105,6 +105,20 @@ def as_mat33(a: wp.mat33d) -> wp.mat33:
     return out
 
 
+@wp.func
+def centre_of(b: int, x: wp.array[wp.vec3], d: Implicit) -> wp.vec3:
+    """Centre of mass of body b [m]."""
+    first = d.body_vert[b]
+    origin = x[first]
+    total = wp.float64(0.0)
+    moment = wp.vec3d()
+    for i in range(first, d.body_vert[b + 1]):
+        m = wp.float64(d.mass[i])
+        total += m
+        moment += m * as_vec3d(x[i] - origin)
+    return origin + as_vec3(moment / total)
+
+
 @wp.kernel
 def find_bodies(
     # in
@@ -120,19 +134,14 @@ def find_bodies(
         return
     first = d.body_vert[b]
     last = d.body_vert[b + 1]
-    origin = x[first]
-    total = wp.float64(0.0)
-    moment = wp.vec3d()
-    for i in range(first, last):
-        m = wp.float64(d.mass[i])
-        total += m
-        moment += m * as_vec3d(x[i] - origin)
-    c = origin + as_vec3(moment / total)
+    c = centre_of(b, x, d)
     d.centre[b] = c
     if d.kind[b] == HELD:
         return
+    total = wp.float64(0.0)
     inertia = wp.mat33d()
     for i in range(first, last):
+        total += wp.float64(d.mass[i])
         r = as_vec3d(x[i] - c)
         inertia += wp.float64(d.mass[i]) * (
             wp.dot(r, r) * wp.identity(n=3, dtype=wp.float64) - wp.outer(r, r)
@@ -219,14 +228,7 @@ def keep_shapes(
         return
     first = d.body_vert[b]
     last = d.body_vert[b + 1]
-    origin = x[first]
-    total = wp.float64(0.0)
-    moment = wp.vec3d()
-    for i in range(first, last):
-        m = wp.float64(d.mass[i])
-        total += m
-        moment += m * as_vec3d(x[i] - origin)
-    c = origin + as_vec3(moment / total)
+    c = centre_of(b, x, d)
     now = wp.mat33d()
     before = wp.mat33d()
     for i in range(first, last):

@@ -145,7 +145,7 @@ def _inverse(
     damping: np.ndarray,
     stiffness: np.ndarray,
     free: np.ndarray,
-    rigid: np.ndarray | None,
+    rigid: tuple[np.ndarray, np.ndarray] | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Blocks of the inverse less its ``rigid`` part, shape (n^2, 3, 3), and norms of the whole.
 
@@ -157,10 +157,12 @@ def _inverse(
     out[chosen] = np.linalg.inv(a[chosen])
     norms = np.linalg.norm(_blocks(out), ord=2, axis=(1, 2))
     if rigid is not None:
-        out -= rigid
+        u, answer = rigid
+        out -= answer @ u.T
         # What rounding leaves of it in a stiff body.
-        project = np.eye(len(m)) - rigid * m
-        out = project @ out @ project.T
+        mu = m[:, None] * u
+        out -= answer @ (mu.T @ out)
+        out -= (out @ mu) @ answer.T
     return _blocks(out), norms
 
 
@@ -173,12 +175,12 @@ def _inertia(mass: np.ndarray, r: np.ndarray) -> np.ndarray:
     return (mass * (r * r).sum(axis=1)).sum() * np.eye(3) - (mass[:, None] * r).T @ r
 
 
-def _rigid_part(mass: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """U M_r^-1 U^T of points ``r`` from their centre of mass, shape (3 n, 3 n)."""
+def _rigid_part(mass: np.ndarray, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """U and U M_r^-1 of points ``r`` from their centre of mass, shape (3 n, 6)."""
     n = len(r)
     u = np.zeros((n, 3, 6))
     u[:, :, :3] = np.eye(3)
     for k in range(3):
         u[:, :, 3 + k] = np.cross(np.eye(3)[k], r)
     u = u.reshape(3 * n, 6)
-    return u @ np.linalg.solve(u.T @ (np.repeat(mass, 3)[:, None] * u), u.T)
+    return u, u @ np.linalg.inv(u.T @ (np.repeat(mass, 3)[:, None] * u))

@@ -7,7 +7,8 @@ With W of constraint.py,
 
 The mobility is 1 / m, so the centre of mass of a contact stays where it is. Eq. (1) alone leaves
 25 to 38 % of an overlap between a vertex and the middle of a triangle. An overlap older than the
-step is left to the search, which balances pressures, not masses.
+step is left to the search, which balances pressures, not masses. In a step without search it waits
+for a second detection pass, which may find a better plane.
 
 A move p n of a contact that slides by u_t changes the angular momentum by p n x u_t. The velocities
 get it back as the torque of tangent.py, dv_k = (b_k . p u_t) n / m_k.
@@ -36,7 +37,7 @@ PASSES = wp.constant(128)  # at most; corners that meet need more than 32
 def begin_closure(
     # in
     threads: int,
-    limits: wp.vec2,  # see below, in edges
+    limits: wp.vec3,  # see below, in edges
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
@@ -50,17 +51,17 @@ def begin_closure(
 ):
     """For each contact: the overlap that is left to later steps.
 
-    The limits are the overlap at the start of the step beyond which a contact is left out, where
-    bodies may have overlapped before, and the largest move in a step.
+    The limits are the overlap at the start of the step beyond which a contact is left out, in
+    worlds where bodies may have overlapped before and in those where they were apart, and the
+    largest move in a step.
     """
     for c in range(wp.tid(), n_contact[0], threads):
         edge = contact[c].edge_length
         slack[c] = 0.0
         if residual[c] > 0.0:
-            slack[c] = wp.max(residual[c] - limits[1] * edge, 0.0) - REST_GAP * edge
+            slack[c] = wp.max(residual[c] - limits[2] * edge, 0.0) - REST_GAP * edge
         i = contact[c].vert[0]
-        apart = worlds.apart[worlds.of_vert[i]] != 0
-        if not apart and -constraint[c].gap_bound * dt[i] > limits[0] * edge:
+        if -constraint[c].gap_bound * dt[i] > limits[worlds.apart[worlds.of_vert[i]]] * edge:
             for k in range(5):
                 if mobility_of(contact[c].vert[k], soft) > 0.0:
                     slack[c] = NONE

@@ -146,7 +146,7 @@ def test_an_overlap_of_before_the_step_is_left_to_the_search(stages, find_contac
     residual.find_gaps(model, state.x, work)
     search.balance(model, state.x, work, ITERATIONS)
     found = state.x.numpy().copy()
-    surface.close(model, state, work, searched=OLD_OVERLAP)
+    surface.close(model, state, work, before=OLD_OVERLAP)
     # The closure has nothing to add to what was found.
     np.testing.assert_array_equal(state.x.numpy(), found)
     moves = found[:, 2] - x0[:, 2]

@@ -16,6 +16,7 @@ PARTS = (
     "extrapolation",  # sweeps run from extrapolated impulses
     "search",  # for the surface between bodies whose overlap is older than the step
     "closure",  # projection of overlaps onto the planes of triangles
+    "old planes",  # the first closure leaves out contacts that seem older than the step
     "second look",  # a detection pass after the closure
     "strays",  # vertices that left their triangle are closed as well
     "closure torque",  # handed back to the velocities

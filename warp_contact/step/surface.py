@@ -35,7 +35,10 @@ def _close_gaps(model: Model, state: State, work: Work, iterations: int) -> None
     searched = OLD_OVERLAP if on("search") else math.inf
     if iterations and on("search"):
         if_any(work.surface.any_old, _search, model, state, work, iterations)
-    close(model, state, work, FIRST_LOOK, searched)
+    # Where bodies were apart, no overlap is older than the step: one that seems so has a wrong
+    # plane, and the second look may find a better one.
+    first = OLD_OVERLAP if on("old planes") else math.inf
+    close(model, state, work, FIRST_LOOK, searched, first)
     # Vertices may now be at other triangles than before, and edges may cross that the narrow phase
     # could not see.
     if on("second look"):
@@ -51,14 +54,19 @@ def _search(model: Model, state: State, work: Work, iterations: int) -> None:
 
 
 def close(
-    model: Model, state: State, work: Work, look: int = FIRST_LOOK, searched: float = math.inf
+    model: Model,
+    state: State,
+    work: Work,
+    look: int = FIRST_LOOK,
+    before: float = math.inf,
+    apart: float = math.inf,
 ) -> None:
     """Move ``state.x`` until no contact overlaps, or as far as one call may move it.
 
     Only in worlds where the ``look`` found an overlap. Vertices then lie in the planes of their
     triangles, edges on what they touch. ``state.v`` changes only by the torque that keeps the
-    angular momentum. Where bodies may have overlapped before, contacts that did by more than
-    ``searched`` edges are left out.
+    angular momentum. Contacts that overlapped by more than some edges when the step began are left
+    out: ``before`` in worlds where bodies may have overlapped then, ``apart`` where they were apart.
     """
     if not on("closure"):
         return
@@ -66,7 +74,7 @@ def close(
     launch_over(
         closure.begin_closure,
         work.capacity.contacts,
-        inputs=[wp.vec2(searched, search.SEARCH_BOUND), c.n, c.record, c.constraint]
+        inputs=[wp.vec3(before, apart, search.SEARCH_BOUND), c.n, c.record, c.constraint]
         + [work.dt, s.residual, work.worlds, search.soft(work)],
         outputs=[s.slack, s.push],
     )

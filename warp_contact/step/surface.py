@@ -66,7 +66,7 @@ def close(
     Only in worlds where the ``look`` found an overlap. Vertices then lie in the planes of their
     triangles, edges on what they touch. ``state.v`` changes only by the torque that keeps the
     angular momentum. Contacts that overlapped by more than some edges when the step began are left
-    out: ``before`` in worlds where bodies may have overlapped then, ``apart`` where they were apart.
+    out: ``before`` in worlds where bodies may have overlapped then, ``apart`` in the others.
     """
     if not on("closure"):
         return

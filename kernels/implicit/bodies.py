@@ -18,6 +18,10 @@ FREE = wp.constant(1)
 HELD = wp.constant(2)  # some of its vertices are fixed
 RIGID = wp.constant(3)
 
+FOUR = wp.constant(4)  # vertices whose answers are summed together: vectors fit into a CPU's
+vec12 = wp.types.vector(length=12, dtype=float)
+mat3x12 = wp.types.matrix(shape=(3, 12), dtype=float)
+
 UPRIGHT = wp.constant(0.05)  # determinant, of a gradient of size 1: above it Newton is fast
 ROUNDS = wp.constant(8)
 EXACT = wp.constant(1.0e-4)  # a last change this small leaves an error of its square
@@ -35,8 +39,8 @@ class Implicit:
     mass: wp.array[float]  # (n_vert,) [kg]
     inv_mass: wp.array[float]  # (n_vert,) [1/kg], 0 for a fixed vertex
     first: wp.array[int]  # (n_body,) first block of its shape, for its step
-    block: wp.array[wp.mat33]  # (n_block,) B_ij of the shapes, by rows [1/kg]
-    norm: wp.array[float]  # (n_block,) spectral norms of (A0^-1)_ij [1/kg]
+    block: wp.array[mat3x12]  # (n_block,) B_ji of the shapes, by rows i, four at once [1/kg]
+    norm: wp.array[wp.vec4]  # (n_block,) spectral norms of (A0^-1)_ij [1/kg]
     rest: wp.array[wp.vec3]  # (n_vert,) [m] from the centre of mass at rest, as the shape was made
     rest_inertia: wp.array[wp.mat33]  # (n_body,) [1/(kg m^2)] the same, inverted
     placed: wp.array[wp.mat33]  # (n_body,) rotation of its shape when it was placed
@@ -72,6 +76,14 @@ def floats(b: int, d: Implicit) -> bool:
 def deforms(b: int, d: Implicit) -> bool:
     """Whether a body takes implicit steps, and is not rigid."""
     return moves(b, d) and d.kind[b] != RIGID
+
+
+@wp.func
+def block_of(i: int, d: Implicit) -> int:
+    """First block of the four vertices to which vertex i belongs; one follows for each vertex."""
+    b = d.vert_body[i]
+    first = d.body_vert[b]
+    return d.first[b] + (i - first) // FOUR * (d.body_vert[b + 1] - first)
 
 
 @wp.func

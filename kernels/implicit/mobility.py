@@ -17,14 +17,17 @@ linear and angular momentum of the impulses, whatever S is. A body with fixed ve
 import warp as wp
 
 from warp_contact.kernels.implicit.bodies import (
+    FOUR,
     RIGID,
     Implicit,
     RigidMotion,
     as_vec3,
     as_vec3d,
+    block_of,
     floats,
     moves,
     rigid_at,
+    vec12,
 )
 from warp_contact.kernels.options import OPTIONS
 
@@ -153,18 +156,30 @@ def multiply(
     # out
     y: wp.array[wp.vec3],  # (n_vert,) [m/s]
 ):
-    """One thread per vertex: R A0^-1 z."""
-    i = wp.tid()
-    b = d.vert_body[i]
-    if busy[b] == 0 or d.kind[b] == RIGID:
-        return
+    """One thread per vertex: R A0^-1 z; the first quarter of those of a body have four each."""
+    t = wp.tid()
+    b = d.vert_body[t]
     first = d.body_vert[b]
-    n = d.body_vert[b + 1] - first
-    row = d.first[b] + (i - first) * n
-    s = rest.v[b] + wp.cross(rest.w[b], d.rest[i])
-    for j in range(n):
-        s += d.block[row + j] * z[first + j]
-    y[i] = d.turn[i] * s
+    last = d.body_vert[b + 1]
+    own = first + FOUR * (t - first)
+    if busy[b] == 0 or d.kind[b] == RIGID or own >= last:
+        return
+    at = block_of(own, d) - first
+    by_x = vec12()  # three sums, of which none waits for another
+    by_y = vec12()
+    by_z = vec12()
+    for j in range(first, last):
+        rows = d.block[at + j]
+        q = z[j]
+        by_x += rows[0] * q[0]
+        by_y += rows[1] * q[1]
+        by_z += rows[2] * q[2]
+    s = by_x + by_y + by_z
+    for k in range(FOUR):
+        i = own + k
+        if i < last:
+            u = rest.v[b] + wp.cross(rest.w[b], d.rest[i])
+            y[i] = d.turn[i] * (u + wp.vec3(s[3 * k], s[3 * k + 1], s[3 * k + 2]))
 
 
 @wp.kernel

@@ -10,7 +10,7 @@ where r . G r is no larger than that.
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import RIGID, Implicit, moves
+from warp_contact.kernels.implicit.bodies import FOUR, RIGID, Implicit, block_of, moves
 from warp_contact.kernels.motion.motion import corner_sum
 from warp_contact.kernels.options import OPTIONS
 
@@ -90,10 +90,8 @@ def begin(
         return
     noise = wp.float64(0.0)
     if d.kind[b] != RIGID:
-        at = d.first[b]
-        n = last - first
         for i in range(first, last):
-            g = d.norm[at + (i - first) * (n + 1)]
+            g = d.norm[block_of(i, d) + i - first][(i - first) % FOUR]
             if g > 0.0:
                 p_i = (1.0 / g - d.mass[i]) / d.h[b] * ROUNDING * wp.length(x[i])
                 noise += wp.float64(g * p_i * p_i)

@@ -8,7 +8,7 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake
 from warp_contact.kernels.implicit.advance import Drift
-from warp_contact.kernels.implicit.bodies import HELD, RIGID, Implicit, RigidMotion
+from warp_contact.kernels.implicit.bodies import HELD, RIGID, Implicit, RigidMotion, mat3x12
 from warp_contact.kernels.implicit.solve import Iteration
 from warp_contact.kernels.impulse.rows import Touched
 from warp_contact.kernels.mobility import Mobility
@@ -139,18 +139,18 @@ def set_blocks(
     blocks: np.ndarray,
     norms: np.ndarray,
 ) -> bool:
-    """Set the blocks (n, 3, 3) [1/kg] of all shapes, one set for each length of the step.
+    """Set the blocks (n, 3, 12) [1/kg] of all shapes, one set for each length of the step.
 
-    ``norms`` are theirs (n,), ``h`` the step of each body [s], ``first`` where its set begins; both
-    (n_body,). Returns whether arrays had to be replaced by larger ones.
+    ``norms`` are theirs (n, 4), ``h`` the step of each body [s], ``first`` where its set begins;
+    both (n_body,). Returns whether arrays had to be replaced by larger ones.
     """
     d = work.bodies
     d.h.assign(h.astype(np.float32))
     d.first.assign(first + np.where(shapes.of_body >= 0, shapes.first[shapes.of_body], 0))
     larger = len(norms) > d.norm.shape[0]
     if larger:
-        d.block = wp.array(blocks, dtype=wp.mat33)
-        d.norm = wp.array(norms, dtype=float)
+        d.block = wp.array(blocks, dtype=mat3x12)
+        d.norm = wp.array(norms, dtype=wp.vec4)
     elif len(norms):
         d.block[: len(norms)].assign(blocks)
         d.norm[: len(norms)].assign(norms)
@@ -165,7 +165,7 @@ def _bodies(model: Model, shapes: Shapes, awake: Awake) -> Implicit:
     d.mass, d.inv_mass = model.mass, model.inv_mass
     d.first = wp.zeros(n, dtype=int)
     n_block = int(shapes.first[-1])
-    d.block, d.norm = wp.zeros(n_block, dtype=wp.mat33), wp.zeros(n_block, dtype=float)
+    d.block, d.norm = wp.zeros(n_block, dtype=mat3x12), wp.zeros(n_block, dtype=wp.vec4)
     d.placed = wp.array(shapes.placed, dtype=wp.mat33)
     d.rest = wp.array(shapes.rest, dtype=wp.vec3)
     inverse = [np.linalg.inv(i) if i.any() else i for i in shapes.inertia]

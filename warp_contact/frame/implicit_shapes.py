@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
-from warp_contact.kernels.implicit.bodies import FREE, HELD, LUMPED, RIGID
+from warp_contact.kernels.implicit.bodies import FOUR, FREE, HELD, LUMPED, RIGID
 from warp_contact.step.forces import apply_damping, apply_stiffness
 
 KEPT = 8  # lengths of steps of which the inverses are kept
@@ -41,7 +41,8 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
         of_body[b] = like.setdefault(_key(model, b), len(firsts))
         if of_body[b] == len(firsts):
             firsts.append(b)
-    blocks = [(start[b + 1] - start[b]) ** 2 for b in firsts]
+    sizes = [start[b + 1] - start[b] for b in firsts]
+    blocks = [-(-n // FOUR) * n for n in sizes]
     first = np.concatenate([[0], np.cumsum(blocks)]).astype(int)
     rest, inertia = np.zeros((model.n_vert, 3)), np.zeros((model.n_body, 3, 3))
     mass = model.mass.numpy().astype(float)
@@ -74,9 +75,9 @@ class Inverses:
         self._kept: dict[float, tuple[np.ndarray, np.ndarray]] = {}
 
     def blocks(self, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Blocks (n, 3, 3) [1/kg] for steps ``h`` [s], shape after shape, and their norms (n,)."""
+        """Blocks (n, 3, 12) [1/kg] for steps ``h`` [s], shape after shape, and norms (n, 4)."""
         if h not in self._kept:
-            none = np.zeros((0, 3, 3)), np.zeros(0)  # all bodies are rigid
+            none = np.zeros((0, 3, 12)), np.zeros((0, 4))  # all bodies are rigid
             found = [none, *(_inverse(h, *shape) for shape in self._shapes)]
             blocks, norms = (np.concatenate(part) for part in zip(*found, strict=True))
             while len(self._kept) >= KEPT:
@@ -147,7 +148,7 @@ def _inverse(
     free: np.ndarray,
     rigid: tuple[np.ndarray, np.ndarray] | None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Blocks of the inverse less its ``rigid`` part, shape (n^2, 3, 3), and norms of the whole.
+    """Blocks of the inverse less its ``rigid`` part, and norms of the whole, in rows of four.
 
     Both are 0 for fixed vertices.
     """
@@ -155,7 +156,7 @@ def _inverse(
     out = np.zeros_like(a)
     chosen = np.ix_(free, free)
     out[chosen] = np.linalg.inv(a[chosen])
-    norms = np.linalg.norm(_blocks(out), ord=2, axis=(1, 2))
+    norms = np.linalg.norm(_blocks(out), ord=2, axis=(2, 3))
     if rigid is not None:
         u, answer = rigid
         out -= answer @ u.T
@@ -163,12 +164,21 @@ def _inverse(
         mu = m[:, None] * u
         out -= answer @ (mu.T @ out)
         out -= (out @ mu) @ answer.T
-    return _blocks(out), norms
+    columns = _in_fours(_blocks(out).swapaxes(2, 3))  # (four, column, axis, 4, 3)
+    return columns.reshape(-1, 3, 3 * FOUR), _in_fours(norms[:, :, None]).reshape(-1, FOUR)
 
 
 def _blocks(a: np.ndarray) -> np.ndarray:
+    """Shape (n, n, 3, 3)."""
     n = len(a) // 3
-    return a.reshape(n, 3, n, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)
+    return a.reshape(n, 3, n, 3).transpose(0, 2, 1, 3)
+
+
+def _in_fours(a: np.ndarray) -> np.ndarray:
+    """Rows of ``a``, shape (n, n, k, ...), four at once, zeros behind: (n / 4, n, k, 4, ...)."""
+    rows = np.zeros((-(-len(a) // FOUR) * FOUR, *a.shape[1:]))
+    rows[: len(a)] = a
+    return np.moveaxis(rows.reshape(-1, FOUR, *a.shape[1:]), 1, 3)
 
 
 def _inertia(mass: np.ndarray, r: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from warp_contact.data.launch import launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import coupled as kernels
-from warp_contact.kernels.impulse import rows
+from warp_contact.kernels.impulse import rows, touched
 from warp_contact.kernels.impulse.impulse import Limits
 from warp_contact.kernels.surface import coupled_closure as closure
 from warp_contact.step import sweeps
@@ -76,14 +76,14 @@ def _sweep(model: Model, y: wp.array, work: Work, solve: Callable, *given) -> No
     w, c, s = work.implicit, work.contacts, work.sweeps
     solve(y, work, *given)
     launch_over(
-        kernels.respond,
+        touched.respond,
         model.n_body,
         inputs=[work.worlds, c.graph, c.record, w.counted, c.part, s.served, w.touched, w.x]
         + [w.bodies],
         outputs=[w.busy, w.by, w.y, w.share, w.impulse],
     )
     launch_over(
-        kernels.move,
+        touched.move,
         model.n_vert,
         inputs=[work.worlds, work.dt, c.graph, w.touched, w.x, w.y, w.share, w.busy, w.by]
         + [w.bodies],

@@ -2,6 +2,7 @@
 
 from warp_contact import interrupts  # noqa: F401  first, as the others take a second
 from warp_contact.errors import SimulationError
+from warp_contact.measure.contact_data import Contacts, PairForce
 from warp_contact.measure.measure import Measure
 from warp_contact.scene.materials import Corotated, NeoHookean, Rigid, SpringNetwork
 from warp_contact.scene.mesh import MeshError, TetMesh
@@ -14,10 +15,12 @@ from warp_contact.usd.writer import UsdWriter
 __all__ = [
     "Body",
     "ContactSurface",
+    "Contacts",
     "Corotated",
     "Measure",
     "MeshError",
     "NeoHookean",
+    "PairForce",
     "Penalty",
     "PredictedForce",
     "Rigid",

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
+from warp_contact.kernels.impulse.pair_impulses import COLUMNS
+
 
 @dataclass
 class ContactForces:
@@ -13,7 +15,7 @@ class ContactForces:
         unit: momentum of one count in ``pair_total`` [N s]
         received: impulse received by each vertex [N s], shape (n_vert,)
         pair_key: the two bodies of a pair with a contact force, -1 where free, shape (pairs,)
-        pair_total: its impulse, in units, shape (pairs, 3)
+        pair_total: its sums, in units, see pair_impulses.py, shape (pairs, COLUMNS)
     """
 
     unit: float
@@ -49,5 +51,5 @@ def allocate(n_vert: int, n_pair: int, unit: float) -> ContactForces:
         unit=unit,
         received=wp.zeros(n_vert, dtype=wp.vec3),
         pair_key=wp.full(n_pair, -1, dtype=wp.int64),
-        pair_total=wp.zeros((n_pair, 3), dtype=wp.int64),
+        pair_total=wp.zeros((n_pair, int(COLUMNS)), dtype=wp.int64),
     )

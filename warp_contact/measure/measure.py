@@ -166,7 +166,7 @@ class Meter:
     def forces(self, work: Work, duration: float) -> dict[tuple[str, str], float]:
         """Mean force between the bodies of each touching pair [N], in the order of the bodies."""
         key = work.forces.pair_key.numpy()
-        total = work.forces.pair_total.numpy() * work.forces.unit
+        total = work.forces.pair_total.numpy()[:, :3] * work.forces.unit
         out = {}
         for k in np.argsort(key):
             if key[k] >= 0 and duration > 0.0:

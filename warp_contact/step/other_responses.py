@@ -29,7 +29,7 @@ def step_literal(
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, search.bisect, model, state.x, work, iterations)
     if_any(work.contacts.n, impulse.exchange, model, state.v, work)
-    impulse.add_forces(work)
+    impulse.add_forces(state.x, work)
 
 
 def step_penalty(
@@ -47,7 +47,7 @@ def step_penalty(
         damp_alone(model, state, work, damping_stages)
     kick(model, state, work, work.awake)
     if_any(work.contacts.n, _push, model, state, work, response)
-    impulse.add_forces(work)
+    impulse.add_forces(state.x, work)
     drift(model, state, work, state.x)
 
 
@@ -58,7 +58,7 @@ def step_predicted(model: Model, state: State, work: Work, damping_stages: int) 
     broad_phase.refresh(model, state.x, work.x, work)
     detect(model, state.x, work.x, work)
     if_any(work.contacts.n, _push_apart, model, state, work)
-    impulse.add_forces(work)
+    impulse.add_forces(state.x, work)
     drift(model, state, work, state.x)
 
 

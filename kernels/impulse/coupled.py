@@ -26,7 +26,7 @@ from warp_contact.kernels.impulse.rows import row_weight
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, total
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.worlds import DONE, LAST, Worlds
+from warp_contact.kernels.worlds import DONE, LAST, Worlds, ask
 
 wp.set_module_options(OPTIONS)
 
@@ -99,14 +99,15 @@ def solve_contacts(
         excess = un + wp.max(to.gap_bound, 0.0)
         before = impulse[c]
         w = row_weight(at, row) * (to.inv_mass_turning / to.inv_mass)
+        h = dt[at.vert[0]]
+        approach = limits.tolerance * wp.min(USUAL * h, 1.0) * at.edge_length
         pushes = before.ahead[3] > 0.0 or excess < 0.0
         if counted[c] == 0:
             busy[c] = 0
             clear_parts(c, part)
             if pushes and not last:
                 counted[c] = 2  # the row sums will count it in the next sweep
-                if sweep < limits.sweeps:
-                    worlds.asking[world] = 1
+                ask(worlds, world, limits.sweeps, -excess * h > approach)
                 for k in range(5):
                     served[at.vert[k]] = sweep
             continue
@@ -115,10 +116,8 @@ def solve_contacts(
             counted[c] = 0
         new = projected(before, u, un, excess, n, to, w)
         off = wp.abs(new.normal - before.ahead[3]) * w
-        h = dt[at.vert[0]]
-        approach = limits.tolerance * wp.min(USUAL * h, 1.0) * at.edge_length
-        if off * h > approach and sweep < limits.sweeps:
-            worlds.asking[world] = 1
+        if off * h > approach:
+            ask(worlds, world, limits.sweeps, True)
         beta = float(0.0)
         if not last:
             beta = limits.extrapolation * float(sweep - 1) / float(sweep + 2)

@@ -53,6 +53,8 @@ class Measure:
         tunnelled_pair: labels of the bodies of the last of these, the one that went through first
         unheld: surface vertices in another body or below a plane, by more than 0.01 of a mean edge,
             that had no contact in the last step
+        unsolved: how often the impulses or the closure of a world ran out of sweeps in the last
+            frame, while a contact still approached or overlapped by more than 1e-4 of an edge
         forces: mean contact force of the frame between two bodies, by their labels [N]
     """
 
@@ -71,6 +73,7 @@ class Measure:
     tunnelled: int
     tunnelled_pair: tuple[str, str] | None
     unheld: int
+    unsolved: int
     forces: dict[tuple[str, str], float]
 
     @property
@@ -130,6 +133,7 @@ class Meter:
             tunnelled=self.tunnelling.count,
             tunnelled_pair=self.tunnelling.pair,
             unheld=unheld if duration > 0.0 else 0,
+            unsolved=int(work.forces.unsolved.numpy().sum()),
             forces=self.forces(work, duration),
         )
 

@@ -9,7 +9,7 @@ from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.scene import Body, Scene
 from warp_contact.scene.shapes import box, cylinder, dish, sphere
 from warp_contact.simulation import Simulation
-from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce, VirtualSurface
 from warp_contact.usd.writer import UsdWriter
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "SpringNetwork",
     "TetMesh",
     "UsdWriter",
+    "VirtualSurface",
     "box",
     "cylinder",
     "dish",

@@ -24,7 +24,8 @@ from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 RATES = 1e-6, 1e12  # of frames [1/s]
 RESPONSES = ContactSurface | Penalty | PredictedForce
-KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce()"
+KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce(), "
+KNOWN += "wc.VirtualSurface(stiffness)"
 
 
 class Simulation(BetweenFrames, ContactData):

@@ -15,8 +15,7 @@ gives it the N-th part. Friction (one_pass.py) acts against the sliding velocity
 import warp as wp
 
 from warp_contact.kernels.impulse.constraint import Constraint, Impulse
-from warp_contact.kernels.impulse.impulse import part_of
-from warp_contact.kernels.impulse.one_pass import with_friction
+from warp_contact.kernels.impulse.one_pass import give, with_friction
 from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
 
@@ -47,6 +46,5 @@ def predicted_impulses(
             g = gap(at, x)
             p = wp.max(-g, 0.0) / (dt[at.vert[0]] * to.inv_mass)
         given = with_friction(p, at.normal, relative_velocity(at, v), mu, to)
-        for k in range(5):
-            part[5 * c + k] = part_of(k, at, to, given.normal * at.normal + given.friction)
         impulse[c] = given
+        give(c, given, at, to, part)

@@ -149,6 +149,7 @@ def one_block(**settings):
     ("settings", "reason"),
     [
         ({"response": wc.Penalty(1e3)}, "only the balanced contact surface"),
+        ({"response": wc.VirtualSurface(1e3)}, "only the balanced contact surface"),
         ({"response": wc.PredictedForce()}, "only the balanced contact surface"),
         ({"response": wc.ContactSurface(search="literal")}, "only the balanced contact surface"),
     ],

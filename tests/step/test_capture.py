@@ -12,6 +12,7 @@ from warp_contact import (
     Rigid,
     Scene,
     Simulation,
+    VirtualSurface,
     box,
 )
 from warp_contact.frame import buffers
@@ -20,6 +21,7 @@ RESPONSES = {
     "surface": ContactSurface(),
     "literal": ContactSurface("literal"),
     "penalty": Penalty(1000.0, 0.5),
+    "virtual": VirtualSurface(2000.0, 0.5),
     "predicted": PredictedForce(),
 }
 FORBIDDEN = [

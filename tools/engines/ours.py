@@ -27,8 +27,9 @@ class Own(NamedTuple):
 
     def response(self, task: Task):
         """For a task; the damping of a penalty keeps its ratio."""
-        if self.method == "penalty":
-            return wc.Penalty(self.times * task.stiffness, self.times**0.5 * task.damping)
+        if self.times:
+            kind = wc.VirtualSurface if self.method == "virtual" else wc.Penalty
+            return kind(self.times * task.stiffness, self.times**0.5 * task.damping)
         if self.method == "predicted":
             return wc.PredictedForce()
         search = "literal" if self.method == "literal" else "balanced"
@@ -42,7 +43,7 @@ ALL = [
     *(Own("default", n) for n in (2, 8)),
     *(Own(name, factor=f) for name in ("impulses alone", "predicted") for f in (1, 2, 4)),
     *(Own("literal", n) for n in (4, 8, 16)),
-    *(Own("penalty", times=k) for k in STIFFNESSES),
+    *(Own(name, times=k) for name in ("penalty", "virtual") for k in STIFFNESSES),
     *(Own("default", n, factor=f) for n in (2, 8, 16) for f in (2, 4)),
     *(Own("literal", n, factor=f) for n in (4, 8, 16) for f in (2, 4)),
     *(Own("penalty", times=k, factor=2) for k in STIFFNESSES),

@@ -24,14 +24,14 @@ from warp_contact.files import append, replacing
 from warp_contact.progress import Progress, announce
 from warp_contact.scene.scene import Scene
 from warp_contact.simulation import Simulation
-from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce, VirtualSurface
 from warp_contact.usd.folder import RunFolder, frame_file
 from warp_contact.usd.kept import check_frames, read_layer
 from warp_contact.usd.motion import motion, numbers
 from warp_contact.usd.prims import parts
 from warp_contact.usd.writer import UsdWriter
 
-RESPONSES = ("contact-surface", "literal", "penalty", "predicted")
+RESPONSES = ("contact-surface", "literal", "penalty", "virtual", "predicted")
 METRICS, CHECKPOINT = "metrics.jsonl", "checkpoint.npz"
 SAVE_EVERY = 1.0  # least time between two checkpoints of a run, but for the last [s]
 
@@ -206,7 +206,7 @@ def build_scene(module: ModuleType, name: str, values: dict):
 
 
 def response(module: ModuleType, args):
-    """The response that was asked for; the penalty takes the scene's constants."""
+    """The response that was asked for; penalties take the scene's constants."""
     if args.response == "contact-surface":
         return ContactSurface()
     if args.response == "literal":
@@ -215,4 +215,5 @@ def response(module: ModuleType, args):
         return PredictedForce()
     if not hasattr(module, "PENALTY"):
         raise UsageError(f"{args.scene} has no PENALTY = {{'stiffness': ..., 'damping': ...}}")
-    return Penalty(**module.PENALTY)
+    kind = VirtualSurface if args.response == "virtual" else Penalty
+    return kind(**module.PENALTY)

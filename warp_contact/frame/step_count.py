@@ -128,7 +128,7 @@ class StepCount:
     def _with_response(self, omega: np.ndarray) -> np.ndarray:
         """The frequencies [1/s] of the elastic forces, or those of a penalty with them."""
         if isinstance(self._response, Penalty):
-            given = self._response.stiffness, self._response.damping, self._largest_inv_mass
+            given = self._response.steepness, self._response.damping, self._largest_inv_mass
             return step_bounds.with_penalty(omega, *given)
         return omega
 

@@ -1,12 +1,9 @@
 """Stage 5, impulses, where some bodies take implicit steps: all contacts at once, by row sums.
 
-    dv = G p                                    p summed over the contacts of a vertex  [m/s]
-
 The sweeps are those of impulse.py, with the bounds of rows.py. A contact that begins to approach
 waits for a sweep, until the row sums count it.
 
-Within the sweeps only touched vertices move (touched.py). The sum of all impulses then moves all
-vertices by G itself.
+Within the sweeps only touched vertices move, then the sum of all impulses moves all (touched.py).
 """
 
 import warp as wp
@@ -168,12 +165,12 @@ def add(
     # in
     before: wp.array[wp.vec3],  # (n_vert,) y before the sweeps
     p: wp.array[wp.vec3],  # (n_vert,) [kg y]
-    answer: wp.array[wp.vec3],  # (n_vert,) G p of bodies that take implicit steps
+    answer: wp.array[wp.vec3],  # (n_vert,) of bodies that take implicit steps
     d: Implicit,
     # out
     y: wp.array[wp.vec3],  # (n_vert,) velocities or positions
 ):
-    """One thread per vertex: add G p."""
+    """One thread per vertex: add what the impulses change."""
     i = wp.tid()
     if d.inv_mass[i] == 0.0:
         y[i] = before[i]

@@ -1,10 +1,13 @@
-"""How bodies that take implicit steps answer what a sweep of coupled.py adds, at touched vertices.
+"""How bodies that take implicit steps answer impulses at few vertices, those with contacts.
 
     dv_i = R_i sum_j B_ij z_j + rigid motion by p,   z_j = R_j^T p_j                    [m/s]
 
-This is G with the rigid part of A0^-1 replaced by that at the present shape. The two differ only
-where a body is bent or sheared, by what the sweeps of a step add. Four neighbouring vertices of a
-body are summed together: no list says which, the first of them with contacts does it.
+This is G with the rigid part of A0^-1 replaced by that at the present shape, and without P^T, which
+would spread each impulse over the whole body: where a body is bent or sheared, its inertia does not
+strain it here. In the sweeps of coupled.py touched vertices move by this. The sum of all impulses
+then moves all vertices, and P takes out the rigid part of the first term, so that a body gets
+exactly the momentum of the impulses. Four neighbouring vertices of a body are summed together; in
+the sweeps no list says which, the first of them with contacts does it.
 """
 
 import warp as wp
@@ -21,6 +24,7 @@ from warp_contact.kernels.implicit.bodies import (
     moves,
     vec12,
 )
+from warp_contact.kernels.implicit.mobility import rigid_motion
 from warp_contact.kernels.impulse.rows import Touched, first_of_four, set_row_sums, share_of
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, total
@@ -159,3 +163,58 @@ def move(
             y[i] = y[i] + u
             if wp.length(u) * dt[i] > worlds.negligible[worlds.of_vert[i]]:
                 changed[i] = sweep
+
+
+@wp.kernel
+def gather(
+    # in
+    threads: int,
+    p: wp.array[wp.vec3],  # (n_vert,) [kg y], 0 without contacts
+    touched: Touched,
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    d: Implicit,
+    # out
+    busy: wp.array[int],  # (n_body,) 1 where there is anything to answer
+    motion: RigidMotion,  # by p
+    z: wp.array[wp.vec3],  # (n_vert,) [kg y] R^T p
+):
+    """For each body that takes implicit steps: the impulses at its vertices with contacts."""
+    for b in range(wp.tid(), touched.n.shape[0], threads):
+        busy[b] = 0
+        if not moves(b, d):
+            continue
+        first = d.body_vert[b]
+        pushed = wp.vec3d()
+        turning = wp.vec3d()
+        for k in range(touched.n[b]):
+            i = touched.vert[first + k]
+            z[i] = wp.vec3(0.0, 0.0, 0.0)
+            if wp.length_sq(p[i]) > 0.0:
+                busy[b] = 1
+                pushed += as_vec3d(p[i])
+                turning += wp.cross(as_vec3d(x[i] - d.centre[b]), as_vec3d(p[i]))
+                z[i] = wp.transpose(d.turn[i]) * p[i]
+        rigid_motion(b, pushed, turning, d, motion)
+
+
+@wp.kernel
+def multiply(
+    # in
+    z: wp.array[wp.vec3],  # (n_vert,) [kg y], at vertices with contacts
+    touched: Touched,
+    d: Implicit,
+    busy: wp.array[int],  # (n_body,)
+    # out
+    y: wp.array[wp.vec3],  # (n_vert,) R B z
+):
+    """One thread per vertex: the first quarter of those of a body have four each."""
+    t = wp.tid()
+    b = d.vert_body[t]
+    first = d.body_vert[b]
+    four = first + FOUR * (t - first)
+    if busy[b] == 0 or d.kind[b] == RIGID or four >= d.body_vert[b + 1]:
+        return
+    s = product_of_touched(four, z, touched, d)
+    for k in range(FOUR):
+        if four + k < d.body_vert[b + 1]:
+            y[four + k] = d.turn[four + k] * wp.vec3(s[3 * k], s[3 * k + 1], s[3 * k + 2])

@@ -1,12 +1,14 @@
 """How a body answers impulses as a whole: kernels against dense matrices in NumPy."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import warp as wp
 
 import warp_contact as wc
 from warp_contact.frame.implicit_shapes import Inverses, find_shapes
-from warp_contact.step import forces
+from warp_contact.step import coupled, forces
 from warp_contact.step.implicit import answer, find_mobility
 
 H = 4e-3  # [s]
@@ -87,6 +89,46 @@ def test_at_rest_it_is_the_inverse_of_the_matrix_of_a_step(dense, cells):
     c = dense(forces.apply_damping, sim.model, rest)
     expected = np.linalg.inv(np.diag(m) + H * c + H * H * k)
     assert np.abs(g - expected).max() < 1e-5 * np.abs(expected).max()  # float32 sums of 135 terms
+
+
+def at_contacts(sim, work, p: np.ndarray) -> np.ndarray:
+    """How impulses ``p`` (n_vert, 3) of contacts, where they are not 0, move all vertices."""
+    for b, (first, last) in enumerate(pairwise(sim.model.body_vert.numpy())):
+        own = first + np.flatnonzero(np.abs(p[first:last]).any(axis=1))
+        verts, n = work.touched.vert.numpy(), work.touched.n.numpy()
+        verts[first : first + len(own)], n[b] = own, len(own)
+        work.touched.vert.assign(verts)
+        work.touched.n.assign(n)
+    out = wp.zeros(sim.model.n_vert, dtype=wp.vec3)
+    coupled.answer(sim.model, wp.array(p, dtype=wp.vec3), out, work)
+    return out.numpy().astype(float)
+
+
+@pytest.mark.parametrize("cells", [(3, 2, 2), (2, 2, 2)])
+def test_impulses_of_contacts_move_a_body_by_its_mobility(rng, cells):
+    sim = simulation(copies=2, cells=cells)
+    work = ready(sim, sim.positions())
+    p = np.zeros((sim.model.n_vert, 3), dtype=np.float32)
+    few = rng.choice(len(p) // 2, 7, replace=False)  # of the first body, none of the second
+    p[few] = rng.standard_normal((7, 3))
+    out = wp.zeros(len(p), dtype=wp.vec3)
+    answer(sim.model, wp.array(p, dtype=wp.vec3), out, work)
+    moved = at_contacts(sim, work, p)
+    # Float32: the first sums of the mobility are over all vertices.
+    np.testing.assert_allclose(moved, out.numpy(), atol=2e-5 * np.abs(moved).max())
+    assert np.abs(moved[len(p) // 2 :]).max() == 0.0
+
+
+def test_they_keep_momentum_where_it_is_bent(rng):
+    sim = simulation(modulus=1e5)
+    x = bent(sim.positions(), rng)
+    work = ready(sim, x)
+    p = np.zeros((len(x), 3), dtype=np.float32)
+    p[rng.choice(len(p), 5, replace=False)] = rng.standard_normal((5, 3))
+    m, modes = np.repeat(sim.model.mass.numpy().astype(float), 3), rigid_modes(x)
+    got = modes.T @ (m * at_contacts(sim, work, p).ravel())
+    # Float32 velocities: some 1e-7 of the parts that are added.
+    np.testing.assert_allclose(got, modes.T @ p.ravel(), atol=3e-6 * np.abs(p).sum())
 
 
 def test_a_body_that_is_turned_answers_turned_impulses_turned(rng):

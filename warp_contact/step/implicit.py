@@ -129,7 +129,8 @@ def _iterate(model: Model, x: wp.array, w: ImplicitWork) -> None:
     _multiply(model, x, w.p, w.ap, w, it.going)
     wp.launch(solve.go, n_body, inputs=[w.p, w.ap, w.bodies], outputs=[it, w.dv, w.r])
     answer(model, w.r, w.z, w, it.going)
-    wp.launch(solve.look, n_body, inputs=[w.r, w.z, w.bodies], outputs=[it, w.p, w.running])
+    outputs = [it, w.p, w.dv, w.running]
+    wp.launch(solve.look, n_body, inputs=[w.r, w.z, w.bodies], outputs=outputs)
 
 
 def _multiply(

@@ -29,6 +29,7 @@ from warp_contact.kernels.implicit.bodies import (
     rigid_at,
     vec12,
 )
+from warp_contact.kernels.implicit.masses import find_solid_motion
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -64,7 +65,7 @@ def find_response(
 def find_rigid_part(
     b: int, y: wp.array[wp.vec3], x: wp.array[wp.vec3], d: Implicit, motion: RigidMotion
 ):
-    """Set the rigid part of velocities y [m/s] of body b."""
+    """Set the rigid part of velocities y [m/s] of body b, which deforms."""
     c = d.centre[b]
     total = wp.vec3d()
     turning = wp.vec3d()
@@ -95,13 +96,18 @@ def rigid_part(
     # in
     y: wp.array[wp.vec3],  # (n_vert,) [m/s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    d: Implicit,
+    # in, out
+    d: Implicit,  # of rigid bodies v and w
     # out
     motion: RigidMotion,
 ):
     """One thread per body without fixed vertices: the rigid part of velocities."""
     b = wp.tid()
-    if moves(b, d) and floats(b, d):
+    if not moves(b, d) or not floats(b, d):
+        return
+    if d.kind[b] == RIGID:
+        find_solid_motion(b, y, x, d, motion)
+    else:
         find_rigid_part(b, y, x, d, motion)
 
 

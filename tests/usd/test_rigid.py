@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 
 import warp_contact as wc
 from warp_contact.command import cli
@@ -91,6 +91,21 @@ def test_world_points_are_the_positions_and_local_points_those_of_the_mesh(tmp_p
     die = reader.read_bodies(stage)[0].sim.GetPointsAttr().Get()
     mesh = wc.box((0.1, 0.06, 0.03), 3).transformed(np.eye(3), (0.4, 0.2, -0.3))
     np.testing.assert_array_equal(die, mesh.vertices.astype(np.float32))
+
+
+def test_what_a_rigid_body_weighs_is_written(tmp_path):
+    run(tmp_path / "run")
+    stage = reader.open_stage(tmp_path / "run")
+    prim = stage.GetPrimAtPath("/World/die")
+    mass, mesh = UsdPhysics.MassAPI(prim), wc.box((0.1, 0.06, 0.03), 3)
+    solid = wc.Rigid(1000.0).solid(mesh.vertices + [0.4, 0.2, -0.3], mesh.tets)
+    turn = np.array(Gf.Matrix3d(Gf.Quatd(mass.GetPrincipalAxesAttr().Get())))
+    moments = np.diag(mass.GetDiagonalInertiaAttr().Get())
+    # Float32.
+    assert mass.GetMassAttr().Get() == pytest.approx(solid.mass, rel=1e-6)
+    np.testing.assert_allclose(mass.GetCenterOfMassAttr().Get(), solid.centre, rtol=1e-6)
+    np.testing.assert_allclose(turn.T @ moments @ turn, solid.inertia, atol=1e-9)
+    assert UsdPhysics.RigidBodyAPI(prim).GetKinematicEnabledAttr().Get() is False
 
 
 def test_a_rigid_body_takes_less_room_than_a_soft_one(tmp_path):

@@ -22,6 +22,8 @@ def fingerprint(model: Model, *settings) -> str:
         digest.update(elements.kernels.__name__.encode())
         arrays += [elements.tet, elements.param]
     digest.update(model.rest.tobytes())
+    for solid in filter(None, model.solids):
+        digest.update(np.array([solid.mass, *solid.centre, *solid.inertia.ravel()]).tobytes())
     for array in arrays:
         digest.update(array.numpy().tobytes())
     return digest.hexdigest()

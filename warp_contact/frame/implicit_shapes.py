@@ -33,7 +33,7 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
         own = slice(start[b], start[b + 1])
         if fixed[own].all():
             continue
-        if model.materials[b].kernels is None:
+        if model.solids[b]:
             kind[b] = int(RIGID)
             continue
         kind[b] = int(HELD) if fixed[own].any() else int(FREE)
@@ -47,7 +47,10 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
     rest, inertia = np.zeros((model.n_vert, 3)), np.zeros((model.n_body, 3, 3))
     mass = model.mass.numpy().astype(float)
     for b in np.flatnonzero(kind != int(LUMPED)):
-        own = slice(start[b], start[b + 1])
+        own, solid = slice(start[b], start[b + 1]), model.solids[b]
+        if solid:
+            rest[own], inertia[b] = model.rest[own] - solid.centre, solid.inertia
+            continue
         r = model.rest[own] - np.average(model.rest[own], axis=0, weights=mass[own])
         rest[own] = r
         inertia[b] = _inertia(mass[own], r)

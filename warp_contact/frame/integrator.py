@@ -75,8 +75,7 @@ def choose(
 
 def _rigid(model: Model) -> str | None:
     """A rigid body that can move, or None."""
-    mobile = np.flatnonzero(_mobile(model))
-    return next((model.labels[b] for b in mobile if model.materials[b].kernels is None), None)
+    return next((name for name, s in zip(model.labels, model.solids, strict=True) if s), None)
 
 
 def _mobile(model: Model) -> np.ndarray:

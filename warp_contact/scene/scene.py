@@ -110,8 +110,8 @@ class Scene:
         try:
             _check_shape(mesh, material, label)
             world = checks.count(world, "world", least=0)
-            x = _placed(mesh, position, rotation)
-            v = _velocities(mesh, x, velocity, angular_velocity)
+            x = _placed(mesh.vertices, position, rotation)
+            v = _velocities(mesh, material, x, (position, rotation), velocity, angular_velocity)
             mask = _mask(fixed, len(x), isinstance(material, Rigid))
             if mask.any() and np.any(angular_velocity):
                 wanted = "zero where vertices are fixed: these go straight, give them targets"
@@ -170,17 +170,23 @@ def _check_shape(mesh, material, label: str) -> None:
     placement.check_shape(mesh, label)
 
 
-def _placed(mesh: TetMesh, position, rotation) -> np.ndarray:
+def _placed(points: np.ndarray, position, rotation) -> np.ndarray:
     turn = rotation_matrix(rotation)
-    return mesh.vertices @ turn.T + checks.numbers(position, (3,), "position", HUGE)
+    return points @ turn.T + checks.numbers(position, (3,), "position", HUGE)
 
 
-def _velocities(mesh: TetMesh, x: np.ndarray, velocity, angular_velocity) -> np.ndarray:
-    """Velocities [m/s] of vertices at ``x``, shape (n, 3)."""
+def _velocities(
+    mesh: TetMesh, material, x: np.ndarray, place: tuple, velocity, angular_velocity
+) -> np.ndarray:
+    """Velocities [m/s] of vertices at ``x``, shape (n, 3), of a mesh at a position and rotation."""
     v = checks.vectors(velocity, len(x), "velocity", checks.FASTEST)
     w = checks.numbers(angular_velocity, (3,), "angular_velocity", HUGE)
-    mass = np.bincount(mesh.tets.ravel(), np.repeat(mesh.volumes, 4), len(x))
-    v = v + np.cross(w, x - np.average(x, axis=0, weights=mass))
+    if isinstance(material, Rigid):
+        centre = _placed(material.solid(mesh.vertices, mesh.tets).centre, *place)
+    else:
+        mass = np.bincount(mesh.tets.ravel(), np.repeat(mesh.volumes, 4), len(x))
+        centre = np.average(x, axis=0, weights=mass)
+    v = v + np.cross(w, x - centre)
     return checks.vectors(v, len(x), "velocity", checks.FASTEST)
 
 

@@ -140,7 +140,7 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
         note(xform, "fixed", Sdf.ValueTypeNames.Bool, part.fixed)
         if part.is_rigid:
             local[slice(*part.verts)] = part.rest
-            add_frame(xform, part.fixed)
+            add_frame(xform, part.fixed, model.solids[part.index])
         add_surface(stage, part, local, look)
         if tets:
             add_tets(stage, part, model, local, physics)
@@ -152,11 +152,20 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
     return layer
 
 
-def add_frame(xform: UsdGeom.Xform, fixed: bool) -> None:
-    """Let the prim of a rigid body be moved."""
+def add_frame(xform: UsdGeom.Xform, fixed: bool, solid) -> None:
+    """Let the prim of a rigid body be moved; ``solid`` is what it weighs, None if it is fixed."""
     xform.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
     xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
     UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim()).CreateKinematicEnabledAttr(fixed)
+    if solid:
+        weighs = UsdPhysics.MassAPI.Apply(xform.GetPrim())
+        moments, axes = np.linalg.eigh(solid.inertia)
+        axes[:, 2] *= np.linalg.det(axes)
+        turn = Gf.Matrix3d(axes.T.tolist()).ExtractRotation().GetQuat()
+        weighs.CreateMassAttr(solid.mass)
+        weighs.CreateCenterOfMassAttr(Gf.Vec3f(*solid.centre.tolist()))
+        weighs.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
+        weighs.CreatePrincipalAxesAttr(Gf.Quatf(turn))
 
 
 def note(prim, name: str, kind, value) -> None:

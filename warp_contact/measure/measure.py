@@ -95,8 +95,7 @@ class Meter:
         self.model = model
         self.mass = model.mass.numpy().astype(np.float64)  # 0 where a body has its own
         self._solids = Solids(model)
-        for part in self._solids:
-            self.mass[part] = 0.0
+        self.mass[self._solids.vertices] = 0.0
         self.names = [*model.labels, *(f"plane{p}" for p in range(model.n_plane))]
         self._tets, self._body = model.tets.numpy(), model.vert_body.numpy()
         self._volume = model.volume.numpy()

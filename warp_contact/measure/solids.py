@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from warp_contact.data.model import Model
-from warp_contact.scene.pose import frame_of, rigid_motion_of
 
 
 @dataclass(frozen=True)
@@ -46,25 +45,39 @@ class Solids:
 
     def __init__(self, model: Model):
         """Read what stays constant."""
-        start, mass = model.body_vert.numpy(), model.mass.numpy().astype(np.float64)
-        self._bodies = []
-        for body, solid in enumerate(model.solids):
-            if solid:
-                own = slice(start[body], start[body + 1])
-                self._bodies.append((own, solid, model.rest[own], mass[own]))
-
-    def __iter__(self):
-        """The vertices of each, as slices."""
-        return (own for own, *_ in self._bodies)
+        bodies = np.array([b for b, solid in enumerate(model.solids) if solid], dtype=int)
+        solids = [model.solids[b] for b in bodies]
+        start = model.body_vert.numpy()
+        counts = np.diff(start)[bodies]
+        self._of_vert = np.repeat(np.arange(len(bodies)), counts)
+        self._first = np.cumsum(counts) - counts
+        self.vertices = np.flatnonzero(np.isin(model.vert_body.numpy(), bodies))
+        self._weight = model.mass.numpy().astype(np.float64)[self.vertices, None]
+        self._mass = np.array([solid.mass for solid in solids])
+        centre = np.array([solid.centre for solid in solids]).reshape(-1, 3)
+        self._inertia = np.array([solid.inertia for solid in solids]).reshape(-1, 3, 3)
+        rest = model.rest[self.vertices]
+        middle = self._mean(rest)
+        self._rest, self._to_centre = rest - middle[self._of_vert], centre - middle
 
     def motion(self, x: np.ndarray, v: np.ndarray) -> Motion:
         """At positions [m] and velocities [m/s] of all vertices, shape (n_vert, 3), float64."""
-        found = np.zeros((len(self._bodies), 4, 3))
-        for row, (own, solid, rest, mass) in zip(found, self._bodies, strict=True):
-            place, turn = frame_of(x[own], rest, mass)
-            centre = place + turn @ solid.centre
-            v_c, w = rigid_motion_of(x[own], v[own], mass, centre)
-            row[:] = centre, v_c, w, turn @ solid.inertia @ turn.T @ w
-        return Motion(
-            np.array([solid.mass for _, solid, *_ in self._bodies]), *found.swapaxes(0, 1)
-        )
+        x, v = x[self.vertices], v[self.vertices]
+        middle, v_m = self._mean(x), self._mean(v)
+        r = x - middle[self._of_vert]
+        u, _, vt = np.linalg.svd(self._mean(r[:, :, None] * self._rest[:, None]))
+        u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
+        turn = u @ vt
+        second = self._mean(r[:, :, None] * r[:, None])
+        moments = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+        w = np.linalg.solve(moments, self._mean(np.cross(r, v))[:, :, None])
+        arm = (turn @ self._to_centre[:, :, None])[:, :, 0]
+        spin = turn @ self._inertia @ turn.swapaxes(1, 2) @ w
+        w, spin = w[:, :, 0], spin[:, :, 0]
+        return Motion(self._mass, middle + arm, v_m + np.cross(w, arm), w, spin)
+
+    def _mean(self, values: np.ndarray) -> np.ndarray:
+        """Weighted means over the vertices of each body."""
+        weight = self._weight.reshape(-1, *np.ones(values.ndim - 1, dtype=int))
+        total = np.add.reduceat(weight, self._first, axis=0)
+        return np.add.reduceat(weight * values, self._first, axis=0) / total

@@ -7,7 +7,7 @@ Heidelberger et al. 2004, with Coulomb friction as in Keiser et al. 2004 (one_pa
 
 import warp as wp
 
-from warp_contact.kernels.impulse.constraint import Constraint, Impulse
+from warp_contact.kernels.impulse.constraint import Constraint, Impulse, coefficient
 from warp_contact.kernels.impulse.one_pass import give, with_friction
 from warp_contact.kernels.narrow_phase.contact import Contact, relative_velocity
 from warp_contact.kernels.options import OPTIONS
@@ -37,7 +37,7 @@ def penalty_impulses(
     # in
     threads: int,
     spring: wp.vec2,  # stiffness [N/m], damping [N s/m]
-    mu: float,
+    friction: wp.array[float],  # (n_body + n_plane,) Coulomb coefficients
     dt: wp.array[float],  # (n_vert,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -52,6 +52,7 @@ def penalty_impulses(
         at = contact[c]
         u = relative_velocity(at, v)
         h = dt[at.vert[0]]
+        mu = coefficient(at.pair, friction)
         given = impulse_of_spring(at.depth, spring, mu, h, u, at.normal, constraint[c])
         impulse[c] = given
         give(c, given, at, constraint[c], part)

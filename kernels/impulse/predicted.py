@@ -14,7 +14,7 @@ gives it the N-th part. Friction (one_pass.py) acts against the sliding velocity
 
 import warp as wp
 
-from warp_contact.kernels.impulse.constraint import Constraint, Impulse
+from warp_contact.kernels.impulse.constraint import Constraint, Impulse, coefficient
 from warp_contact.kernels.impulse.one_pass import give, with_friction
 from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
@@ -26,7 +26,7 @@ wp.set_module_options(OPTIONS)
 def predicted_impulses(
     # in
     threads: int,
-    mu: float,
+    friction: wp.array[float],  # (n_body + n_plane,) Coulomb coefficients
     dt: wp.array[float],  # (n_vert,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -45,6 +45,7 @@ def predicted_impulses(
         if to.inv_mass > 0.0:
             g = gap(at, x)
             p = wp.max(-g, 0.0) / (dt[at.vert[0]] * to.inv_mass)
+        mu = coefficient(at.pair, friction)
         given = with_friction(p, at.normal, relative_velocity(at, v), mu, to)
         impulse[c] = given
         give(c, given, at, to, part)

@@ -52,7 +52,7 @@ class Model:
         solids: of each body that is rigid and moves freely, None for the others
         elements: the tets, one entry for each material model in use
         gravity: acceleration [m/s^2]
-        friction: Coulomb coefficient [-]
+        friction: Coulomb coefficient of each body, then of each plane, shape (n_body + n_plane,)
         n_body: number of bodies
         n_vert: number of vertices
         n_tet: number of tets
@@ -95,7 +95,7 @@ class Model:
     solids: tuple[Solid | None, ...]
     elements: tuple[Elements, ...]
     gravity: tuple[float, float, float]
-    friction: float
+    friction: wp.array
     n_body: int
     n_vert: int
     n_tet: int

@@ -31,7 +31,7 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         solids=tuple(_solid(body) for body in bodies),
         elements=_elements(scene, tet0),
         gravity=scene.gravity,
-        friction=scene.friction,
+        friction=_floats(_friction(scene)),
         n_body=len(bodies),
         n_vert=len(x),
         n_tet=len(tets),
@@ -45,6 +45,12 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         plane_h=_floats([h for _, h in scene.planes]),
     )
     return model, State(x=wp.array(x, dtype=wp.vec3), v=wp.array(v, dtype=wp.vec3))
+
+
+def _friction(scene: Scene) -> list[float]:
+    """Coulomb coefficient of each body, then of each plane."""
+    own = [*(body.friction for body in scene.bodies), *scene.plane_friction]
+    return [scene.friction if mu is None else mu for mu in own]
 
 
 def _first(bodies: list, part: str) -> np.ndarray:

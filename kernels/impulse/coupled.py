@@ -112,7 +112,9 @@ def solve_contacts(
         if not pushes and sweep % RECOUNT == 0:
             counted[c] = 0
         new = projected(before, u, un, excess, n, to, w)
-        off = wp.abs(new.normal - before.ahead[3]) * w
+        y = before.ahead
+        rubbed = wp.length(new.friction - wp.vec3(y[0], y[1], y[2]))
+        off = wp.max(wp.abs(new.normal - y[3]), rubbed) * w
         if off * h > approach:
             ask(worlds, world, limits.sweeps, True)
         beta = float(0.0)

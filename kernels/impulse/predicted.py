@@ -9,7 +9,9 @@ of the idea with the contacts of this package:
 
 with W of constraint.py, where N_k contacts share vertex k. A single contact closes exactly: F moves
 its two sides by h^2 W F relative to each other. Where N contacts need the same of a vertex, each
-gives it the N-th part. Friction (one_pass.py) acts against the sliding velocity of v*.
+gives it the N-th part. Where some bodies take implicit steps W is a bound (rows.py), and one that
+is alone closes in part too, over several steps. Friction (one_pass.py) acts against the sliding
+velocity of v*.
 """
 
 import warp as wp

@@ -258,7 +258,7 @@ def test_what_a_rigid_body_cannot_do_is_refused_by_name():
     scene = wc.Scene()
     scene.add_body(box, rigid, label="tool")
     with pytest.raises(ValueError, match="'tool' is rigid"):
-        wc.Simulation(scene, wc.Penalty(1e3))
+        wc.Simulation(scene, wc.ContactSurface("literal"))
     with pytest.raises(ValueError, match="density"):
         wc.Rigid(-1.0)
     explicit = wc.Scene()

@@ -58,6 +58,23 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
     return Shapes(kind, of_body, placed, first, rest, inertia, *wrench)
 
 
+def largest_mobilities(model: Model) -> np.ndarray:
+    """How all vertices of a body together answer impulses on each, at most [1/kg], (n_vert,).
+
+    The inverse masses, but for rigid bodies whose mass lies further inside than their vertices.
+    """
+    found, mass = model.inv_mass.numpy().astype(float), model.mass.numpy().astype(float)
+    start = model.body_vert.numpy()
+    for b, solid in enumerate(model.solids):
+        if solid:
+            own, of_body = slice(start[b], start[b + 1]), np.zeros((6, 6))
+            u = _rigid_motions(model.rest[own] - solid.centre)
+            of_body[:3, :3], of_body[3:, 3:] = solid.mass * np.eye(3), solid.inertia
+            of_vertices = u.T @ (np.repeat(mass[own], 3)[:, None] * u)
+            found[own] *= np.linalg.eigvals(np.linalg.solve(of_body, of_vertices)).real.max()
+    return found
+
+
 class Inverses:
     """The inverses of A0 of all shapes, for a few lengths of the step."""
 
@@ -190,10 +207,14 @@ def _inertia(mass: np.ndarray, r: np.ndarray) -> np.ndarray:
 
 def _rigid_part(mass: np.ndarray, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """U and U M_r^-1 of points ``r`` from their centre of mass, shape (3 n, 6)."""
-    n = len(r)
-    u = np.zeros((n, 3, 6))
+    u = _rigid_motions(r)
+    return u, u @ np.linalg.inv(u.T @ (np.repeat(mass, 3)[:, None] * u))
+
+
+def _rigid_motions(r: np.ndarray) -> np.ndarray:
+    """U of points ``r``, shape (3 n, 6)."""
+    u = np.zeros((len(r), 3, 6))
     u[:, :, :3] = np.eye(3)
     for k in range(3):
         u[:, :, 3 + k] = np.cross(np.eye(3)[k], r)
-    u = u.reshape(3 * n, 6)
-    return u, u @ np.linalg.inv(u.T @ (np.repeat(mass, 3)[:, None] * u))
+    return u.reshape(-1, 6)

@@ -13,7 +13,7 @@ from warp_contact.kernels.impulse import penalty, predicted, virtual
 from warp_contact.step import broad_phase, impulse, residual, search
 from warp_contact.step.damping import damp_alone
 from warp_contact.step.detection import detect, detect_vertices
-from warp_contact.step.motion import drift, kick, predict
+from warp_contact.step.motion import finish, kick, predict
 from warp_contact.step.response import Penalty, VirtualSurface
 
 
@@ -41,14 +41,14 @@ def step_penalty(
     the damping acts alone, before all forces: the state at rest must not depend on it.
     """
     work.worlds.apart.zero_()
-    broad_phase.refresh(model, state.x, state.x, work)
-    detect(model, state.x, state.x, work)
     if damping_stages > 0:
         damp_alone(model, state, work, damping_stages)
     kick(model, state, work, work.awake)
+    broad_phase.refresh(model, state.x, state.x, work)
+    detect(model, state.x, state.x, work)
     if_any(work.contacts.n, _push, model, state, work, response)
     impulse.add_forces(state.x, work)
-    drift(model, state, work, state.x)
+    finish(model, state, work)
 
 
 def step_predicted(model: Model, state: State, work: Work, damping_stages: int) -> None:
@@ -59,7 +59,7 @@ def step_predicted(model: Model, state: State, work: Work, damping_stages: int) 
     detect(model, state.x, work.x, work)
     if_any(work.contacts.n, _push_apart, model, state, work)
     impulse.add_forces(state.x, work)
-    drift(model, state, work, state.x)
+    finish(model, state, work)
 
 
 def push_half_step(model: Model, now: State, work: Work, response: Penalty) -> None:

@@ -11,6 +11,7 @@ import warp as wp
 
 from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
+from warp_contact.frame import elements
 from warp_contact.kernels.implicit.bodies import FOUR, FREE, HELD, LUMPED, RIGID
 from warp_contact.step.forces import apply_damping, apply_stiffness
 
@@ -124,29 +125,13 @@ def _rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _element_matrices(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and damping of each tet at rest, shape (n_tet, 12, 12).
 
-    Each tet gets vertices of its own, so that twelve products give all columns. They are where the
-    mesh has them: copies have the same bits, wherever they stand.
+    They are where the mesh has them: copies have the same bits, wherever they stand.
     """
     corners = model.rest[model.tets.numpy()]
-    apart = wp.array(corners.reshape(-1, 3), dtype=wp.vec3)
-    of_tets = _with_own_vertices(model, corners)
-    out = np.zeros((2, model.n_tet, 12, 12))
-    f = wp.zeros(4 * model.n_tet, dtype=wp.vec3)
-    for k in range(12):
-        dx = np.zeros((model.n_tet, 4, 3), dtype=np.float32)
-        dx[:, k // 3, k % 3] = 1.0
-        at = wp.array(dx.reshape(-1, 3), dtype=wp.vec3)
-        for matrix, apply in zip(out, (apply_stiffness, apply_damping), strict=True):
-            f.zero_()
-            apply(of_tets, apart, at, f)
-            matrix[:, :, k] = f.numpy().reshape(model.n_tet, 12)
-    return out[0], out[1]
-
-
-def _with_own_vertices(model: Model, corners: np.ndarray) -> Model:
-    own = wp.array(np.arange(4 * model.n_tet, dtype=np.int32).reshape(-1, 4), dtype=wp.vec4i)
     pose = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
-    return replace(model, tets=own, pose=wp.array(pose, dtype=wp.mat33))
+    of_tets = replace(elements.apart(model), pose=wp.array(pose, dtype=wp.mat33))
+    both = apply_stiffness, apply_damping
+    return tuple(elements.matrices(of_tets, apply, corners) for apply in both)
 
 
 def _assemble(model: Model, b: int, matrices: np.ndarray) -> np.ndarray:

@@ -1,19 +1,25 @@
-"""Tets that implicit steps crush: what is flat is stiffer than its mobility says.
+"""Tets that implicit steps crush, or strain too much at once.
 
 An explicit step that is too long shows in the frequency that it is held against. Implicit steps are
-stable, but impulses reckon with the stiffness at rest. A frame after which tets are flatter than
-before is repeated with twice as many steps, ``TIMES`` at most. As long as any is flat, the next
-frame takes as many as this one, then half as many at least.
+stable, but they go along the tangent, and impulses reckon with the stiffness at rest: what is flat
+is stiffer than that, and a large strain in one step may add energy. A frame after which tets are
+flatter than before, or strained by more than ``STRAIN`` in a step, is repeated with twice as many
+steps, ``TIMES`` at most. What is flat needs no more of them than explicit steps would be: these
+mobilities are then as good as inverse masses. As long as any is flat, the next frame takes as many
+as this one, or that many, then half as many at least.
 """
 
 import numpy as np
 
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
+from warp_contact.frame import elements
 from warp_contact.frame.step_bounds import served
 from warp_contact.frame.worlds import Worlds
+from warp_contact.step.forces import apply_stiffness
 
 FLAT = 0.1  # of its volume at rest: a tet with less is flat
+STRAIN = 0.2  # in a step, the largest of any tet; a ball at 0.7 of its speed of sound needs it
 TIMES = 6  # a frame is repeated, at most
 AGAIN = 2.0  # times the steps
 KEPT = 0.5  # part of the steps that the next frame takes at least
@@ -26,8 +32,14 @@ class Inversion:
         """Read the tets once; explicit steps, not ``implicit``, have frequencies for it."""
         self._implicit = implicit
         self._tets = model.tets.numpy()
+        self._pose = model.pose.numpy().astype(np.float64)
         self._volume = 6.0 * model.volume.numpy().astype(np.float64)
         self._of_tet = worlds.of_vert[self._tets[:, 0]]
+        self._apart = elements.apart(model) if implicit else None
+        body = model.vert_body.numpy()
+        volume = np.bincount(body[self._tets[:, 0]], self._volume / 6.0, model.n_body)
+        density = np.bincount(body, model.mass.numpy(), model.n_body) / volume
+        self._mass = density[body[self._tets[:, 0]]] * self._volume / 24.0
         self._n = worlds.n
         self._before = np.zeros(worlds.n)
         self._times = np.zeros(worlds.n, dtype=int)
@@ -43,14 +55,48 @@ class Inversion:
         if not self._implicit:
             return rates
         missing = self._missing(state)
-        worse = ~(missing <= self._before) & ((self._times < TIMES) | ~np.isfinite(missing))
-        kept = np.where(self._times > 0, KEPT, 0.0)
-        kept = np.where(missing > 0.0, 1.0, kept)
+        strained = self._strain_rate(state) * dt > STRAIN
+        now, enough = served(dt), self._frequency_of_flat(state)
+        worse = (~(missing <= self._before) & ~(now >= enough)) | strained
+        worse &= (self._times < TIMES) | ~np.isfinite(missing)
+        kept = np.where(self._times > 0, KEPT * now, 0.0)
+        kept = np.where(missing > 0.0, np.minimum(now, enough), kept)
         self._times += worse
-        return np.stack([np.where(worse, AGAIN, kept) * served(dt), rates[1]])
+        return np.stack([np.where(worse, AGAIN * now, kept), rates[1]])
 
     def _missing(self, state: State) -> np.ndarray:
         """How much of its volume the flat tets lack to be not flat, summed over each world."""
+        return np.bincount(self._of_tet, np.maximum(FLAT - self._ratios(state), 0.0), self._n)
+
+    def _ratios(self, state: State) -> np.ndarray:
+        """Volume of each tet over that at rest, shape (n_tet,)."""
         a, b, c, d = np.moveaxis(state.x.numpy()[self._tets], 1, 0)
-        ratio = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / self._volume
-        return np.bincount(self._of_tet, np.maximum(FLAT - ratio, 0.0), self._n)
+        return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / self._volume
+
+    def _frequency_of_flat(self, state: State) -> np.ndarray:
+        """A bound on the frequency of the flat tets of each world [1/s], 0 without, (n_world,).
+
+        The largest of single tets with their shares of the masses (Irons and Treharne 1971).
+        """
+        most = np.zeros(self._n)
+        flat = np.flatnonzero(~(self._ratios(state) >= FLAT))
+        if len(flat):
+            corners = state.x.numpy()[self._tets]
+            k = elements.matrices(self._apart, apply_stiffness, corners)[flat]
+            size = np.abs(k).sum(axis=2).max(axis=1)  # no eigenvalue is larger
+            np.maximum.at(most, self._of_tet[flat], np.sqrt(size / self._mass[flat]))
+        return most
+
+    def _strain_rate(self, state: State) -> np.ndarray:
+        """Largest rate of Green's strain of a tet in each world [1/s], shape (n_world,)."""
+        f, rate = (self._gradients(a.numpy()) for a in (state.x, state.v))
+        e = np.einsum("tki,tkj->tij", f, rate)
+        size = 0.5 * np.linalg.norm(e + e.swapaxes(1, 2), axis=(1, 2))
+        largest = np.zeros(self._n)
+        np.maximum.at(largest, self._of_tet, size)
+        return largest
+
+    def _gradients(self, u: np.ndarray) -> np.ndarray:
+        """Gradient of ``u``, shape (n_vert, 3), over each tet, shape (n_tet, 3, 3)."""
+        at = u[self._tets].astype(np.float64)
+        return (at[:, 1:] - at[:, :1]).swapaxes(1, 2) @ self._pose

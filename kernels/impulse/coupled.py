@@ -19,7 +19,7 @@ from warp_contact.kernels.impulse.impulse import (
     projected,
     surface_velocity,
 )
-from warp_contact.kernels.impulse.rows import row_weight
+from warp_contact.kernels.impulse.rows import RECOUNT, row_weight
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, total
 from warp_contact.kernels.options import OPTIONS
@@ -28,7 +28,6 @@ from warp_contact.kernels.worlds import DONE, LAST, Worlds, ask
 wp.set_module_options(OPTIONS)
 
 USUAL = wp.constant(240.0)  # steps [1/s]: shorter ones allow as much velocity, not as much way
-RECOUNT = wp.constant(8)  # sweeps until contacts that no longer push are no longer counted
 
 
 @wp.kernel

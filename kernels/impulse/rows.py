@@ -5,7 +5,9 @@
 
 An impulse on one vertex moves all vertices of such a body, so the sweeps need another bound than
 mass splitting: W bounds the sum of a row of the matrix J G J^T of all contacts, by the triangle
-inequality. Only contacts that may move count, those with an impulse or an approach.
+inequality. Only contacts that may move count, those with an impulse or an approach. Contacts that
+begin to count are added to the sums at once, those that no longer push are left out at every sweep
+of a multiple of RECOUNT.
 """
 
 import warp as wp
@@ -18,6 +20,7 @@ from warp_contact.kernels.options import OPTIONS
 wp.set_module_options(OPTIONS)
 
 ROOM = wp.constant(1.1)  # on the row sums: G differs a little from S, of which the norms are
+RECOUNT = wp.constant(8)  # sweeps until contacts that no longer push are no longer counted
 
 
 @wp.struct
@@ -26,6 +29,16 @@ class Touched:
 
     n: wp.array[int]  # (n_body,) how many
     vert: wp.array[int]  # (n_vert,) which, ascending, from the first vertex of their body on
+
+
+@wp.struct
+class Shares:
+    """How much the vertices take part in the contacts that count."""
+
+    of_vert: wp.array[float]  # (n_vert,) s_j
+    n: wp.array[int]  # (n_body,) how many changed in this sweep
+    vert: wp.array[int]  # (n_vert,) which, from the first vertex of their body on
+    by: wp.array[float]  # (n_vert,) by how much, in the same places
 
 
 @wp.kernel
@@ -64,6 +77,15 @@ def share_of(
 
 
 @wp.func
+def begins(i: int, graph: ContactGraph, counted: wp.array[int]) -> bool:
+    """Whether a contact of vertex i begins to count in this sweep."""
+    for e in range(graph.start[i], graph.start[i + 1]):
+        if counted[graph.entry[e] // 5] == 2:
+            return True
+    return False
+
+
+@wp.func
 def first_of_four(i: int, graph: ContactGraph, d: Implicit) -> int:
     """First of the four vertices of vertex i, if none of them before i has contacts; else -1."""
     first = i - (i - d.body_vert[d.vert_body[i]]) % FOUR
@@ -75,7 +97,7 @@ def first_of_four(i: int, graph: ContactGraph, d: Implicit) -> int:
 
 @wp.func
 def rigid_row_sum(
-    i: int, share: wp.array[float], touched: Touched, x: wp.array[wp.vec3], d: Implicit
+    i: int, share: Shares, touched: Touched, x: wp.array[wp.vec3], d: Implicit
 ) -> float:
     """Row sum t of vertex i of a rigid body [1/kg]."""
     b = d.vert_body[i]
@@ -84,8 +106,8 @@ def rigid_row_sum(
     arm = float(0.0)
     for k in range(touched.n[b]):
         j = touched.vert[first + k]
-        s += share[j]
-        arm += share[j] * wp.length(x[j] - d.centre[b])
+        s += share.of_vert[j]
+        arm += share.of_vert[j] * wp.length(x[j] - d.centre[b])
     c = d.inv_inertia[b]  # its norm is at most that of Frobenius
     own = wp.length(x[i] - d.centre[b])
     return ROOM * (d.inv_total[b] * s + wp.sqrt(wp.ddot(c, c)) * own * arm)
@@ -94,32 +116,39 @@ def rigid_row_sum(
 @wp.func
 def set_row_sums(
     four: int,
+    anew: bool,
     graph: ContactGraph,
-    share: wp.array[float],
+    share: Shares,
     touched: Touched,
     x: wp.array[wp.vec3],
     d: Implicit,
     row: wp.array[float],
 ):
-    """Set the row sums t of those of four vertices that have contacts [1/kg]."""
+    """Set the row sums t of those of four vertices that have contacts, or add to them [1/kg]."""
     b = d.vert_body[four]
     first = d.body_vert[b]
     dense = moves(b, d) and d.kind[b] != RIGID
     sums = wp.vec4()
     if dense:
         at = block_of(four, d) - first
-        for k in range(touched.n[b]):
-            j = touched.vert[first + k]
-            sums += share[j] * d.norm[at + j]
+        if anew:
+            for k in range(touched.n[b]):
+                j = touched.vert[first + k]
+                sums += share.of_vert[j] * d.norm[at + j]
+        else:
+            for k in range(first, first + share.n[b]):
+                sums += share.by[k] * d.norm[at + share.vert[k]]
     for k in range(FOUR):
         i = four + k
         if i < d.body_vert[b + 1] and graph.start[i] < graph.start[i + 1]:
-            if dense or d.inv_mass[i] == 0.0:
-                row[i] = ROOM * sums[k]
+            if d.inv_mass[i] == 0.0:
+                row[i] = 0.0
+            elif dense:
+                row[i] = ROOM * sums[k] + wp.where(anew, 0.0, row[i])
             elif d.kind[b] == RIGID and d.awake[b] != 0:
                 row[i] = rigid_row_sum(i, share, touched, x, d)
             else:
-                row[i] = d.inv_mass[i] * share[i]
+                row[i] = d.inv_mass[i] * share.of_vert[i]
 
 
 @wp.kernel
@@ -143,14 +172,14 @@ def find_shares(
     contact: wp.array[Contact],  # (capacity,)
     counted: wp.array[int],  # (capacity,)
     # out
-    share: wp.array[float],  # (n_vert,) s_j
+    share: Shares,  # those of the vertices
     served: wp.array[int],  # (n_vert,) 0: nothing yet
     changed: wp.array[int],  # (n_vert,) 0: nothing yet
 ):
     """For each vertex with contacts: how much it takes part in those that count."""
     for k in range(wp.tid(), graph.n_touched[0], threads):
         i = graph.touched[k]
-        share[i] = share_of(i, graph, contact, counted)
+        share.of_vert[i] = share_of(i, graph, contact, counted)
         served[i] = 0
         changed[i] = 0
 
@@ -161,7 +190,7 @@ def find_rows(
     threads: int,
     graph: ContactGraph,
     touched: Touched,
-    share: wp.array[float],  # (n_vert,)
+    share: Shares,
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     d: Implicit,
     # out
@@ -171,7 +200,7 @@ def find_rows(
     for k in range(wp.tid(), graph.n_touched[0], threads):
         four = first_of_four(graph.touched[k], graph, d)
         if four >= 0:
-            set_row_sums(four, graph, share, touched, x, d, row)
+            set_row_sums(four, True, graph, share, touched, x, d, row)
 
 
 @wp.func

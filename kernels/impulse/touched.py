@@ -25,7 +25,15 @@ from warp_contact.kernels.implicit.bodies import (
     vec12,
 )
 from warp_contact.kernels.implicit.mobility import rigid_motion
-from warp_contact.kernels.impulse.rows import Touched, first_of_four, set_row_sums, share_of
+from warp_contact.kernels.impulse.rows import (
+    RECOUNT,
+    Shares,
+    Touched,
+    begins,
+    first_of_four,
+    set_row_sums,
+    share_of,
+)
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, total
 from warp_contact.kernels.options import OPTIONS
@@ -52,7 +60,7 @@ def respond(
     motion: RigidMotion,  # by what it adds
     z: wp.array[wp.vec3],  # (n_vert,) [kg y] R^T p
     # in, out
-    share: wp.array[float],  # (n_vert,)
+    share: Shares,
     # out, added to
     sum: wp.array[wp.vec3],  # (n_vert,) [kg y] of all sweeps
 ):
@@ -69,15 +77,21 @@ def respond(
                 break
         if busy[b] == 0:
             continue
+        n = int(0)
+        recounts = sweep % RECOUNT == 0
         as_whole = moves(b, d)
         pushed = wp.vec3d()
         turning = wp.vec3d()
         for k in range(touched.n[b]):
             i = touched.vert[first + k]
-            s = share_of(i, graph, contact, counted)
-            if s != share[i]:
-                busy[b] = 2
-                share[i] = s
+            if recounts or begins(i, graph, counted):
+                s = share_of(i, graph, contact, counted)
+                if s != share.of_vert[i]:
+                    share.vert[first + n] = i
+                    share.by[first + n] = s - share.of_vert[i]
+                    share.of_vert[i] = s
+                    n += 1
+                    busy[b] = 2
             z[i] = wp.vec3(0.0, 0.0, 0.0)
             if served[i] == sweep:
                 p = total(i, graph, part)
@@ -88,6 +102,7 @@ def respond(
                     z[i] = wp.transpose(d.turn[i]) * p
                 else:
                     z[i] = p
+        share.n[b] = n
         if as_whole:
             motion.v[b] = d.inv_total[b] * as_vec3(pushed)
             motion.w[b] = d.inv_inertia[b] * as_vec3(turning)
@@ -112,6 +127,20 @@ def product_of_touched(four: int, z: wp.array[wp.vec3], touched: Touched, d: Imp
     return by_x + by_y + by_z
 
 
+@wp.func
+def velocity(
+    i: int, strain: wp.vec3, z: wp.vec3, x: wp.vec3, motion: RigidMotion, d: Implicit
+) -> wp.vec3:
+    """Answer of vertex i, where B z is ``strain``."""
+    b = d.vert_body[i]
+    if not moves(b, d):
+        return d.inv_mass[i] * z
+    u = motion.v[b] + wp.cross(motion.w[b], x - d.centre[b])
+    if d.kind[b] != RIGID:
+        u += d.turn[i] * strain
+    return u
+
+
 @wp.kernel
 def move(
     # in
@@ -122,14 +151,14 @@ def move(
     touched: Touched,
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     z: wp.array[wp.vec3],  # (n_vert,) [kg y]
-    share: wp.array[float],  # (n_vert,)
+    share: Shares,
     busy: wp.array[int],  # (n_body,)
     motion: RigidMotion,  # by what this sweep adds
     d: Implicit,
     # in, out
     y: wp.array[wp.vec3],  # (n_vert,) velocities or positions
-    # out
     row: wp.array[float],  # (n_vert,) [1/kg]
+    # out
     changed: wp.array[int],  # (n_vert,) this sweep where it changed y, else an older one
 ):
     """For each vertex with contacts, of a body that is busy: how it answers, and its row sum.
@@ -145,24 +174,19 @@ def move(
         if busy[b] == 0:
             continue
         if busy[b] == 2:
-            set_row_sums(four, graph, share, touched, x, d, row)
+            set_row_sums(four, sweep % RECOUNT == 0, graph, share, touched, x, d, row)
         s = vec12()
         if deforms(b, d):
             s = product_of_touched(four, z, touched, d)
         for k in range(FOUR):
             i = four + k
-            if i >= d.body_vert[b + 1]:
-                break
-            if graph.start[i] == graph.start[i + 1] or d.inv_mass[i] == 0.0:
-                continue
-            u = d.inv_mass[i] * z[i]
-            if moves(b, d):
-                u = motion.v[b] + wp.cross(motion.w[b], x[i] - d.centre[b])
-                if d.kind[b] != RIGID:
-                    u += d.turn[i] * wp.vec3(s[3 * k], s[3 * k + 1], s[3 * k + 2])
-            y[i] = y[i] + u
-            if wp.length(u) * dt[i] > worlds.negligible[worlds.of_vert[i]]:
-                changed[i] = sweep
+            if i < d.body_vert[b + 1] and graph.start[i] < graph.start[i + 1]:
+                if d.inv_mass[i] > 0.0:
+                    u = wp.vec3(s[3 * k], s[3 * k + 1], s[3 * k + 2])
+                    u = velocity(i, u, z[i], x[i], motion, d)
+                    y[i] = y[i] + u
+                    if wp.length(u) * dt[i] > worlds.negligible[worlds.of_vert[i]]:
+                        changed[i] = sweep
 
 
 @wp.kernel

@@ -77,8 +77,9 @@ def solve_gaps(
         for k in range(5):
             served[at.vert[k]] = sweep
         if counted[c] == 0:  # the row sums will count it in the next pass
-            counted[c] = 1
+            counted[c] = 2
             continue
+        counted[c] = 1
         p = wp.max(ahead[c] - g / row_weight(at, row), 0.0)
         beta = float(0.0)
         if not last and (ahead[c] - p) * (p - push[c]) <= 0.0:

@@ -17,7 +17,7 @@ from warp_contact.kernels.implicit.bodies import (
     mat3x12,
 )
 from warp_contact.kernels.implicit.solve import Iteration
-from warp_contact.kernels.impulse.rows import Touched
+from warp_contact.kernels.impulse.rows import Shares, Touched
 from warp_contact.kernels.mobility import Mobility
 
 
@@ -61,7 +61,7 @@ class ImplicitWork:
         y: R^T P^T p, shape (n_vert,)
         impulse, answer: impulses on the vertices, and how they answer, shape (n_vert,)
         before: velocities or positions before the sweeps, shape (n_vert,)
-        share: of the vertices in their contacts, shape (n_vert,)
+        share: of the vertices in their contacts
         touched: vertices of each body with contacts
         counted: contacts in the row sums, shape (contacts,)
         ahead: extrapolated pushes of the closure [kg m], shape (contacts,)
@@ -90,7 +90,7 @@ class ImplicitWork:
     impulse: wp.array[wp.vec3]
     answer: wp.array[wp.vec3]
     before: wp.array[wp.vec3]
-    share: wp.array[float]
+    share: Shares
     touched: Touched
     counted: wp.array[int]
     ahead: wp.array[float]
@@ -118,7 +118,7 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
         gradient=wp.zeros(n_tet, dtype=wp.mat33),
         stiff=wp.zeros(4 * n_tet, dtype=wp.vec3),
         damped=wp.zeros(4 * n_tet if damped else 0, dtype=wp.vec3),
-        share=wp.zeros(n, dtype=float),
+        share=_shares(model),
         touched=_touched(model),
         counted=wp.zeros(n_contact, dtype=int),
         ahead=wp.zeros(n_contact, dtype=float),
@@ -235,6 +235,14 @@ def _soft(model: Model, shapes: Shapes) -> Mobility:
     soft.inv_mass = wp.array(np.where(rigid, 0.0, model.inv_mass.numpy()), dtype=float)
     soft.row = wp.zeros(0, dtype=float)
     return soft
+
+
+def _shares(model: Model) -> Shares:
+    share = Shares()
+    share.of_vert, share.by = (wp.zeros(model.n_vert, dtype=float) for _ in range(2))
+    share.n = wp.zeros(model.n_body, dtype=int)
+    share.vert = wp.zeros(model.n_vert, dtype=int)
+    return share
 
 
 def _touched(model: Model) -> Touched:

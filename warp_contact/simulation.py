@@ -11,6 +11,7 @@ from warp_contact.between_frames import BetweenFrames
 from warp_contact.contact_data import ContactData
 from warp_contact.exclusive import exclusively
 from warp_contact.frame import checkpoint, memory
+from warp_contact.frame.implicit_shapes import find_shapes
 from warp_contact.frame.integrator import KINDS as INTEGRATORS
 from warp_contact.frame.integrator import choose
 from warp_contact.frame.load_kernels import load_kernels
@@ -66,8 +67,9 @@ class Simulation(BetweenFrames, ContactData):
                 settled pile costs next to nothing, at an accuracy that ``frame/sleeping.py`` states
             max_substeps: a frame that needs more of them ends the run, with its reason
             integrator: ``explicit``, or ``implicit`` for few long steps, whatever the stiffness:
-                these damp vibrations faster than the step, and impacts lose more energy; ``auto``
-                takes the cheaper one, see ``summary``
+                these damp vibrations faster than the step, and impacts lose more energy. Bodies of
+                more than 800 vertices take explicit ones beside them. ``auto`` takes what is
+                cheaper, see ``summary``
 
         Raises:
             ValueError: for an empty scene, an unknown device, response or integrator, fps or
@@ -94,7 +96,9 @@ class Simulation(BetweenFrames, ContactData):
         self._integrator = choose(integrator, *of, self.response)
         load_kernels(self.model, self.device, self._integrator.implicit)
         settings = self.response, self.fps, substeps, max_substeps, sleeping
-        self._stepper = Stepper(*of, *settings, self._integrator.implicit)
+        x = self.state.x.numpy().astype(np.float64)
+        shapes = find_shapes(self.model, x) if self._integrator.implicit else None
+        self._stepper = Stepper(*of, *settings, shapes)
         self._meter = Meter(self.model)
 
     @property

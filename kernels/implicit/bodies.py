@@ -60,8 +60,8 @@ class Implicit:
     placed: wp.array[wp.mat33]  # (n_body,) rotation of its shape when it was placed
     turn: wp.array[wp.mat33]  # (n_vert,) R_i
     centre: wp.array[wp.vec3]  # (n_body,) [m] of mass
-    inv_total: wp.array[float]  # (n_body,) [1/kg] of its mass; 0 for a body that is held
-    inv_inertia: wp.array[wp.mat33]  # (n_body,) [1/(kg m^2)]; 0 for a body that is held
+    inv_total: wp.array[float]  # (n_body,) [1/kg] of its mass; 0 for one that is held or lumped
+    inv_inertia: wp.array[wp.mat33]  # (n_body,) [1/(kg m^2)]; as inv_total
     force: wp.array[wp.vec3]  # (n_body,) [N] from outside
     torque: wp.array[wp.vec3]  # (n_body,) [N m] from outside
     solids: Solids
@@ -85,6 +85,14 @@ def moves(b: int, d: Implicit) -> bool:
 def floats(b: int, d: Implicit) -> bool:
     """Whether a body has no fixed vertices: its rigid motion is its own."""
     return d.kind[b] == FREE or d.kind[b] == RIGID
+
+
+@wp.func
+def is_pushed(b: int, d: Implicit) -> bool:
+    """Whether a force or torque from outside acts on a lumped body, and it is awake."""
+    if d.kind[b] != LUMPED or d.awake[b] == 0:
+        return False
+    return wp.length_sq(d.force[b]) > 0.0 or wp.length_sq(d.torque[b]) > 0.0
 
 
 @wp.func

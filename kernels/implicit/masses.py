@@ -25,6 +25,7 @@ from warp_contact.kernels.implicit.bodies import (
     as_mat33d,
     as_vec3,
     as_vec3d,
+    is_pushed,
     moves,
     polar,
     rotation,
@@ -112,7 +113,7 @@ def find_bodies(
     b = wp.tid()
     d.inv_total[b] = 0.0
     d.inv_inertia[b] = wp.mat33(0.0)
-    if not moves(b, d):
+    if not moves(b, d) and not is_pushed(b, d):
         return
     if d.kind[b] == RIGID:
         find_solid(b, x, d)

@@ -21,6 +21,7 @@ from warp_contact.kernels.implicit.bodies import (
     acceleration,
     deforms,
     floats,
+    is_pushed,
     moves,
     rigid_at,
 )
@@ -153,9 +154,11 @@ def kick(
     # in, out
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
 ):
-    """One thread per vertex: add what comes about in the time dt."""
+    """One thread per vertex: add what comes about in the time dt; to a lumped body pushes alone."""
     i = wp.tid()
     b = d.vert_body[i]
+    if is_pushed(b, d):
+        v[i] = v[i] + dt[i] * acceleration(i, b, x[i], d)
     if d.inv_mass[i] == 0.0 or not moves(b, d):
         return
     u = dv[i]
@@ -177,5 +180,5 @@ def push(
     """One thread per vertex: let what acts from outside act for a part of the time dt."""
     i = wp.tid()
     b = d.vert_body[i]
-    if moves(b, d) and floats(b, d):
+    if is_pushed(b, d) or (moves(b, d) and floats(b, d)):
         v[i] = v[i] + part * dt[i] * acceleration(i, b, x[i], d)

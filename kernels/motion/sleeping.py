@@ -116,10 +116,11 @@ def pause_vertices(
     # in
     vert_body: wp.array[int],  # (n_vert,)
     inv_mass: wp.array[float],  # (n_vert,) [1/kg]
+    lumped: wp.array[float],  # (n_vert,) [1/kg] the same, 0 where steps are implicit
     awake: wp.array[int],  # (n_body,)
     idle: wp.array[int],  # (n_body,) 1 in a world of which all bodies sleep
     # out
-    pliant: wp.array[float],  # (n_vert,) [1/kg] inv_mass, 0 asleep
+    pliant: wp.array[float],  # (n_vert,) [1/kg] lumped, 0 asleep
     v: wp.array[wp.vec3],  # (n_vert,) [m/s] 0 asleep
     impulse: wp.array[wp.vec3],  # (n_vert,) [N s] of the frame: unchanged asleep, else 0
 ):
@@ -130,7 +131,7 @@ def pause_vertices(
     i = wp.tid()
     pliant[i] = 0.0
     if awake[vert_body[i]] == 1:
-        pliant[i] = inv_mass[i]
+        pliant[i] = lumped[i]
     else:
         v[i] = wp.vec3(0.0, 0.0, 0.0)
     if awake[vert_body[i]] == 1 or (inv_mass[i] == 0.0 and idle[vert_body[i]] == 0):

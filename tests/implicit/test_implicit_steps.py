@@ -181,6 +181,12 @@ def test_the_steps_of_a_frame_come_from_a_short_list():
     assert implicit_steps(np.zeros(2), np.array([0.0, 900.0]), 1000.0).tolist() == [1, 2]
 
 
+def test_beside_explicit_bodies_steps_shrink_only_where_fewer_suffice_with_room():
+    asked = (47.0, 0), (47.0, 64), (40.0, 64), (70.0, 64)  # steps needed, and in the last frame
+    taken = [implicit_steps(60.0 * n, 0.0, 60.0, last=last).item() for n, last in asked]
+    assert taken == [48, 64, 48, 96]
+
+
 def test_a_block_that_is_crushed_recovers_and_gains_no_energy():
     scene = wc.Scene(friction=0.3)
     scene.add_plane((0.0, 0.0, 1.0), 0.0)

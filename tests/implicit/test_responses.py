@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import warp_contact as wc
+from warp_contact.frame import implicit_shapes
 
 G = 9.81
 RIGID, SOFT = wc.Rigid(1000.0), wc.NeoHookean(1e6, 0.3, 1000.0, 1e-3)
@@ -88,3 +89,23 @@ def test_a_penalty_gets_the_steps_that_the_inertia_asks_for():
     assert light.substeps > 4 * heavy.substeps
     # What the penalty stores comes back, but for the length of the step.
     assert most < 1.1 * start
+
+
+@pytest.mark.parametrize(
+    "response", [wc.Penalty(1e4, 2.0), wc.VirtualSurface(1e4, 2.0), wc.PredictedForce()]
+)
+def test_a_tool_rests_on_a_body_too_large_for_an_inverse(response, monkeypatch):
+    monkeypatch.setattr(implicit_shapes, "LARGEST", 30)  # the lower block has 64 vertices
+    scene = wc.Scene(friction=0.3)
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    strong = wc.NeoHookean(5e4, 0.3, 1000.0, 1e-2)
+    scene.add_body(wc.box(0.1, 3), strong, (0.0, 0.0, 0.0501), label="foam")
+    scene.add_body(wc.box(0.06, 2), wc.Rigid(2000.0), (0.005, 0.0, 0.1302), label="tool")
+    sim, found = wc.Simulation(scene, response), []
+    weight = G * sim.model.mass.numpy()
+    above = {("foam", "plane0"): weight.sum(), ("foam", "tool"): weight[64:].sum()}
+    for frame in sim.frames(60):
+        if frame > 50:
+            forces = sim.measure().forces
+            found.append([forces[pair] / load for pair, load in above.items()])
+    np.testing.assert_allclose(np.mean(found, axis=0), 1.0, atol=1e-2)

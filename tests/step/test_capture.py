@@ -15,7 +15,7 @@ from warp_contact import (
     VirtualSurface,
     box,
 )
-from warp_contact.frame import buffers
+from warp_contact.frame import buffers, implicit_shapes
 
 RESPONSES = {
     "surface": ContactSurface(),
@@ -53,7 +53,7 @@ def touching(overlap: float, upper=None) -> Scene:
 
 @pytest.mark.parametrize("overlap", [0.0, 0.03])
 @pytest.mark.parametrize(
-    "name", [*RESPONSES, "implicit", "rigid", "rigid penalty", "rigid predicted"]
+    "name", [*RESPONSES, "implicit", "rigid", "rigid penalty", "rigid predicted", "mixed"]
 )
 def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap):
     captured = []
@@ -73,6 +73,8 @@ def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap
         captured.append(args)
 
     monkeypatch.setattr(buffers, "take_steps", guarded)
+    if name == "mixed":
+        monkeypatch.setattr(implicit_shapes, "LARGEST", 30)  # the upper block is lumped
     scene = touching(overlap, Rigid(1000.0) if name.startswith("rigid") else None)
     integrator = "explicit" if name in RESPONSES else "implicit"
     sim = Simulation(scene, RESPONSES.get(name.removeprefix("rigid ")), integrator=integrator)

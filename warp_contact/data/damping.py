@@ -48,11 +48,16 @@ def allocate(model: Model) -> Damping | None:
 
 
 def divide(d: Damping | None, model: Model, of_vert: np.ndarray, n_world: int) -> None:
-    """Let each world have a polynomial of its own; ``of_vert`` are their numbers, (n_vert,)."""
+    """Let each world have a polynomial of its own; ``of_vert`` are their numbers, (n_vert,).
+
+    Only bodies with tets in ``model`` are damped by it.
+    """
     if d:
         d.row.assign(of_vert.astype(np.int32))
         d.coef, d.reach = wp.zeros((n_world, MOST), dtype=float), wp.ones(n_world, dtype=float)
+        own = [model.tet_body.numpy()[e.tet.numpy()] for e in model.elements]
         of_body = np.array([material.damping > 0.0 for material in model.materials])
+        of_body &= np.isin(np.arange(model.n_body), np.concatenate(own))
         damped = np.bincount(of_vert, of_body[model.vert_body.numpy()], n_world) > 0.0
         if not damped.all():
             d.undamped = wp.array(~damped[of_vert], dtype=int)

@@ -25,6 +25,8 @@ from warp_contact.kernels.mobility import Mobility
 class Shapes:
     """Which bodies take implicit steps, and which of them share a shape.
 
+    Those that are lumped have a form and moments too, for forces from outside.
+
     Attributes:
         kind: of each body, see ``kernels/implicit/bodies.py``, shape (n_body,)
         of_body: number of the shape of each body, -1 for none, shape (n_body,)
@@ -33,6 +35,9 @@ class Shapes:
         rest: vertices of the shape of each body from its centre of mass [m], shape (n_vert, 3)
         inertia: moments of inertia about it [kg m^2], shape (n_body, 3, 3)
         force, torque: that act on bodies from outside [N], [N m], shape (n_body,)
+        lumped: bodies that take explicit steps beside the others, a mask, shape (n_body,)
+        explicit: the model with the tets of these alone, where only they move
+        implicit: the model with the tets of the others
     """
 
     kind: np.ndarray
@@ -43,6 +48,9 @@ class Shapes:
     inertia: np.ndarray
     force: wp.array
     torque: wp.array
+    lumped: np.ndarray
+    explicit: Model
+    implicit: Model
 
 
 @dataclass
@@ -51,6 +59,8 @@ class ImplicitWork:
 
     Attributes:
         bodies: what kernels know of them
+        deforming: the model with their tets alone
+        lumped: that of bodies that take explicit steps beside them; None where none does
         x: positions at which the mobilities are [m], shape (n_vert,)
         any_held: whether some of them have fixed vertices
         soft: the mobilities of vertices that are not of rigid bodies
@@ -74,6 +84,8 @@ class ImplicitWork:
     """
 
     bodies: Implicit
+    deforming: Model
+    lumped: Model | None
     x: wp.array[wp.vec3]
     any_held: bool
     soft: Mobility
@@ -108,11 +120,13 @@ class ImplicitWork:
 def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> ImplicitWork:
     """Allocate for the bodies that take implicit steps; ``set_blocks`` gives the mobilities."""
     n, n_tet = model.n_vert, model.n_tet
-    damped = any(e.damped for e in model.elements)
+    damped = any(e.damped for e in shapes.implicit.elements)
     names = ("x", "f", "r", "z", "p", "ap", "dv", "y", "impulse", "answer", "before")
     vectors = {k: wp.zeros(n, dtype=wp.vec3) for k in names}
     return ImplicitWork(
         bodies=_bodies(model, shapes, awake),
+        deforming=shapes.implicit,
+        lumped=shapes.explicit if shapes.lumped.any() else None,
         any_held=bool((shapes.kind == int(HELD)).any()),
         soft=_soft(model, shapes),
         gradient=wp.zeros(n_tet, dtype=wp.mat33),

@@ -25,7 +25,8 @@ class Awake:
     Attributes:
         bodies: 1 awake, 0 asleep, shape (n_body,)
         tets: the same for the tets, shape (n_tet,)
-        inv_mass: 1 / m, 0 for a fixed vertex and asleep [1/kg], shape (n_vert,)
+        inv_mass: 1 / m of vertices that take explicit steps, 0 for one that is fixed or asleep
+            [1/kg], shape (n_vert,)
     """
 
     bodies: wp.array

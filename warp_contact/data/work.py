@@ -41,7 +41,7 @@ class Work:
         scan: scratch of running sums
         f_tet: forces on the corners of each tet [N], shape (4 n_tet,)
         x: predicted positions, then those before the search [m], shape (n_vert,)
-        damping: of damped bodies; None where no body is damped, or all take implicit steps
+        damping: of damped bodies that take explicit steps; None where there are none
         implicit: of bodies that take implicit steps; None where none does
         broad_phase: which pairs may touch
         narrow_phase: intermediate results on the way to the contacts
@@ -116,7 +116,7 @@ def allocate_work(
         ),
         f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=wp.zeros(n, dtype=wp.vec3),
-        damping=None if shapes else damping.allocate(model),
+        damping=damping.allocate(shapes.explicit if shapes else model),
         implicit=implicit.allocate(model, shapes, awake, m) if shapes else None,
         broad_phase=broad,
         narrow_phase=narrow,

@@ -46,9 +46,10 @@ def set_velocities(
         v[at] = values + gained.v.numpy()[at]
         return state.v.assign(v)
     v[at] = values
+    awake = everything(work.implicit.lumped or model)
     for _ in range(ROUNDS):  # what half a step adds depends on the velocity, by less than itself
         now = State(state.x, wp.array(v, dtype=wp.vec3))
-        shift_velocities(model, now, work, everything(model), 0.5 * dt)
+        shift_velocities(model, now, work, awake, 0.5 * dt)
         v[at] += values - now.v.numpy()[at]
     state.v.assign(v)
 

@@ -4,12 +4,12 @@ import numpy as np
 import warp as wp
 
 from warp_contact.data import damping
-from warp_contact.data.implicit import set_blocks
+from warp_contact.data.implicit import Shapes, set_blocks
 from warp_contact.data.model import Model
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work, allocate_work
-from warp_contact.frame.implicit_shapes import Inverses, find_shapes
+from warp_contact.frame.implicit_shapes import Inverses
 from warp_contact.frame.worlds import Worlds
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
@@ -35,13 +35,11 @@ class Buffers:
         response: ContactSurface | Penalty | PredictedForce,
         awake: Awake | None,
         worlds: Worlds,
-        implicit: bool,
+        shapes: Shapes | None,
     ):
         """Allocate on the current device; ``awake`` is what moves, None for everything."""
-        self._worlds = worlds
-        rest = state.x.numpy().astype(np.float64)
-        self.shapes = find_shapes(model, rest) if implicit else None
-        self._inverses = Inverses(model, self.shapes) if implicit else None
+        self._worlds, self.shapes = worlds, shapes
+        self._inverses = Inverses(model, shapes) if shapes else None
         self._steps = np.zeros(0)  # of the bodies, that the mobilities are for [s]
         self._model, self._state, self._awake = model, state, awake
         self.response = response
@@ -106,5 +104,6 @@ class Buffers:
         work = allocate_work(self._model, self._state, capacity, *given)
         if len(self._steps):
             self._set_blocks(work, self._steps)
-        damping.divide(work.damping, self._model, self._worlds.of_vert, self._worlds.n)
+        explicit = self.shapes.explicit if self.shapes else self._model
+        damping.divide(work.damping, explicit, self._worlds.of_vert, self._worlds.n)
         return work

@@ -16,6 +16,18 @@ from warp_contact.kernels.implicit.bodies import FOUR, FREE, HELD, LUMPED, RIGID
 from warp_contact.step.forces import apply_damping, apply_stiffness
 
 KEPT = 8  # lengths of steps of which the inverses are kept
+LARGEST = 800  # vertices of a body with an inverse: it takes 26 MB and seconds to find
+
+
+def mobile(model: Model) -> np.ndarray:
+    """Bodies of which not all vertices are fixed, a mask, shape (n_body,)."""
+    return np.maximum.reduceat(model.inv_mass.numpy(), model.body_vert.numpy()[:-1]) > 0.0
+
+
+def too_large(model: Model) -> np.ndarray:
+    """Bodies that move and deform and have no inverse, a mask, shape (n_body,)."""
+    deforms = np.array([material.kernels is not None for material in model.materials])
+    return mobile(model) & deforms & (np.diff(model.body_vert.numpy()) > LARGEST)
 
 
 def find_shapes(model: Model, x: np.ndarray) -> Shapes:
@@ -25,15 +37,14 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
     """
     kind = np.full(model.n_body, int(LUMPED))
     of_body = np.full(model.n_body, -1)
+    moving, lumped = mobile(model), too_large(model)
     placed = np.tile(np.eye(3), (model.n_body, 1, 1))
     like: dict[tuple, int] = {}
     firsts: list[int] = []
     start = model.body_vert.numpy()
     fixed = model.inv_mass.numpy() == 0.0
-    for b in range(model.n_body):
+    for b in np.flatnonzero(moving & ~lumped):
         own = slice(start[b], start[b + 1])
-        if fixed[own].all():
-            continue
         if model.solids[b]:
             kind[b] = int(RIGID)
             continue
@@ -47,7 +58,7 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
     first = np.concatenate([[0], np.cumsum(blocks)]).astype(int)
     rest, inertia = np.zeros((model.n_vert, 3)), np.zeros((model.n_body, 3, 3))
     mass = model.mass.numpy().astype(float)
-    for b in np.flatnonzero(kind != int(LUMPED)):
+    for b in np.flatnonzero(moving):
         own, solid = slice(start[b], start[b + 1]), model.solids[b]
         if solid:
             rest[own], inertia[b] = model.rest[own] - solid.centre, solid.inertia
@@ -56,7 +67,8 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
         rest[own] = r
         inertia[b] = _inertia(mass[own], r)
     wrench = (wp.zeros(model.n_body, dtype=wp.vec3) for _ in range(2))
-    return Shapes(kind, of_body, placed, first, rest, inertia, *wrench)
+    parts = lumped, *_parts(model, lumped)
+    return Shapes(kind, of_body, placed, first, rest, inertia, *wrench, *parts)
 
 
 def largest_mobilities(model: Model) -> np.ndarray:
@@ -81,16 +93,20 @@ class Inverses:
 
     def __init__(self, model: Model, shapes: Shapes):
         """Assemble stiffness and damping at rest."""
-        stiff, damped = _element_matrices(model)
-        start = model.body_vert.numpy()
+        firsts = [int((shapes.of_body == k).argmax()) for k in range(len(shapes.first) - 1)]
+        ends = model.body_tet.numpy()
+        own = [np.arange(ends[b], ends[b + 1]) for b in firsts]
+        stiff, damped = _element_matrices(model, np.concatenate([*own, []]).astype(int))
+        start, last = model.body_vert.numpy(), 0
         mass, inv_mass = model.mass.numpy().astype(float), model.inv_mass.numpy()
         self._shapes = []
-        for k in range(len(shapes.first) - 1):
-            b = int(np.flatnonzero(shapes.of_body == k)[0])
+        for b, tet in zip(firsts, own, strict=True):
+            first, last = last, last + len(tet)
             free = np.repeat(inv_mass[start[b] : start[b + 1]] > 0.0, 3)
             m = np.repeat(mass[start[b] : start[b + 1]], 3)
             r = shapes.rest[start[b] : start[b + 1]]
-            matrices = _assemble(model, b, damped), _assemble(model, b, stiff)
+            given = (matrix[first:last] for matrix in (damped, stiff))
+            matrices = (_assemble(model, b, of_tets) for of_tets in given)
             rigid = _rigid_part(m[::3], r) if free.all() else None
             self._shapes.append((m, *matrices, free, rigid))
         self._kept: dict[float, tuple[np.ndarray, np.ndarray]] = {}
@@ -105,6 +121,20 @@ class Inverses:
                 del self._kept[next(iter(self._kept))]
             self._kept[h] = blocks.astype(np.float32), norms.astype(np.float32)
         return self._kept[h]
+
+
+def _parts(model: Model, lumped: np.ndarray) -> tuple[Model, Model]:
+    """The model with the tets of bodies that are ``lumped`` alone, and with those of the others.
+
+    In the first one only their vertices move.
+    """
+    of_tet, number = lumped[model.tet_body.numpy()[: model.n_tet]], np.arange(model.n_tet)
+    inv_mass = np.where(lumped[model.vert_body.numpy()], model.inv_mass.numpy(), np.float32(0.0))
+    own = elements.some(model, of_tet, number)
+    explicit = replace(model, elements=own, inv_mass=wp.array(inv_mass, dtype=float))
+    if not own:
+        return explicit, model
+    return explicit, replace(model, elements=elements.some(model, ~of_tet, number))
 
 
 def _key(model: Model, b: int) -> tuple:
@@ -122,26 +152,26 @@ def _rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
 
 
-def _element_matrices(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness and damping of each tet at rest, shape (n_tet, 12, 12).
+def _element_matrices(model: Model, of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and damping of the tets ``of``, ids (n,), at rest, shape (n, 12, 12).
 
     They are where the mesh has them: copies have the same bits, wherever they stand.
     """
-    corners = model.rest[model.tets.numpy()]
+    corners = model.rest[model.tets.numpy()[of]]
     pose = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
-    of_tets = replace(elements.apart(model), pose=wp.array(pose, dtype=wp.mat33))
+    of_tets = replace(elements.apart(model, of), pose=wp.array(pose, dtype=wp.mat33))
     both = apply_stiffness, apply_damping
     return tuple(elements.matrices(of_tets, apply, corners) for apply in both)
 
 
 def _assemble(model: Model, b: int, matrices: np.ndarray) -> np.ndarray:
-    """The matrix of body ``b``, shape (3 n, 3 n), symmetric."""
+    """The matrix of body ``b`` from those of its tets, shape (3 n, 3 n), symmetric."""
     v0, v1 = model.body_vert.numpy()[b : b + 2]
     t0, t1 = model.body_tet.numpy()[b : b + 2]
     tets = model.tets.numpy()[t0:t1] - v0
     rows = (3 * tets[:, :, None] + np.arange(3)).reshape(len(tets), 12)
     out = np.zeros((3 * (v1 - v0), 3 * (v1 - v0)))
-    np.add.at(out, (rows[:, :, None], rows[:, None, :]), matrices[t0:t1])
+    np.add.at(out, (rows[:, :, None], rows[:, None, :]), matrices)
     return 0.5 * (out + out.T)
 
 

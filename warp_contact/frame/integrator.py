@@ -2,7 +2,8 @@
 
 An explicit step has to be shorter than the fastest vibration of the stiffest tet, an implicit one
 not. It costs more, damps vibrations that it does not resolve, and needs the inverse of a matrix for
-each shape.
+each shape. Where steps are implicit, bodies too large for that take explicit ones beside the
+others: their frequency then sets how many steps their world takes.
 """
 
 from dataclasses import dataclass
@@ -11,14 +12,16 @@ import numpy as np
 
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
-from warp_contact.frame import step_bounds
+from warp_contact.frame import implicit_shapes, step_bounds
+from warp_contact.frame.implicit_shapes import mobile, too_large
 from warp_contact.frame.spectrum import Spectrum
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 KINDS = "explicit", "implicit", "auto"
-LARGEST = 800  # vertices of a body: its inverse takes 26 MB and seconds to find
 DEARER = 3.0  # time of an implicit step, in explicit ones, of bodies of few vertices
 DENSE = 15.0  # vertices of a body that add as much as an explicit step: an inverse is dense
+BESIDE = 1.2  # the same of bodies that take explicit ones beside them: their number is rounded up
+NAMED = 3  # bodies that a summary names
 
 
 @dataclass(frozen=True)
@@ -55,24 +58,34 @@ def choose(
     if rigid:
         if obstacle:
             raise ValueError(f"body '{rigid}' is rigid and takes implicit steps: {obstacle}")
-        return Integrator(True, f"body '{rigid}' is rigid")
+        return Integrator(True, f"body '{rigid}' is rigid{_beside(model)}")
     if wanted == "explicit":
         return Integrator(False, "the default")
     if wanted == "implicit":
         if obstacle:
             raise ValueError(f"integrator='implicit' is not possible: {obstacle}")
-        return Integrator(True, "as asked for")
+        return Integrator(True, f"as asked for{_beside(model)}")
     if not isinstance(response, ContactSurface):
         obstacle = "their number follows from the response"
     if obstacle:
         return Integrator(False, obstacle)
-    spectrum = Spectrum(model)
-    per_second = float(spectrum.rates(state.x)[0].max()) / (2.0 * step_bounds.SAFETY)
-    stiffest = model.labels[int(spectrum.of_bodies[0].argmax())]
-    n = np.diff(model.body_vert.numpy())[_mobile(model)].astype(float)
-    dear = (DEARER + np.average(n, weights=n) / DENSE) * step_bounds.RESOLVED if len(n) else np.inf
+    return _cheaper(model, state)
+
+
+def _cheaper(model: Model, state: State) -> Integrator:
+    """The kind of steps that takes less time."""
+    spectrum, large = Spectrum(model), too_large(model)
+    spectrum.rates(state.x)
+    of_bodies = spectrum.of_bodies[0] / (2.0 * step_bounds.SAFETY)
+    per_second, stiffest = float(of_bodies.max()), model.labels[int(of_bodies.argmax())]
+    n, dear = np.where(mobile(model), np.diff(model.body_vert.numpy()), 0), np.inf
+    if n.any():
+        taken = max(step_bounds.RESOLVED, of_bodies[large].max(initial=0.0))
+        dear = np.average(np.where(large, BESIDE, DEARER + n / DENSE), weights=n) * taken
+    implicit = per_second > dear
     why = f"body '{stiffest}' would need {per_second:.0f} explicit steps a second"
-    return Integrator(per_second > dear, f"{why}, as dear as implicit ones from {dear:.0f} on")
+    why = f"{why}, as dear as implicit ones from {dear:.0f} on"
+    return Integrator(implicit, why + _beside(model) if implicit else why)
 
 
 def _rigid(model: Model) -> str | None:
@@ -80,18 +93,25 @@ def _rigid(model: Model) -> str | None:
     return next((name for name, s in zip(model.labels, model.solids, strict=True) if s), None)
 
 
-def _mobile(model: Model) -> np.ndarray:
-    """Bodies of which not all vertices are fixed, shape (n_body,)."""
-    return np.maximum.reduceat(model.inv_mass.numpy(), model.body_vert.numpy()[:-1]) > 0.0
+def _beside(model: Model) -> str:
+    """Which bodies take explicit steps beside implicit ones, and why; empty if none does."""
+    names = [f"'{model.labels[b]}'" for b in np.flatnonzero(too_large(model))]
+    if not names:
+        return ""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    one = len(names) == 1
+    which = f"body {names[0]} takes" if one else f"bodies {', '.join(names[:NAMED])}{more} take"
+    return f"; {which} explicit ones, having more than {implicit_shapes.LARGEST} vertices"
 
 
 def _obstacle(model: Model, response) -> str:
     """Why implicit steps are not possible; empty if they are."""
     if isinstance(response, ContactSurface) and response.search == "literal":
         return "the literal search moves vertex by vertex; take another response"
-    for body in np.flatnonzero(_mobile(model)):
+    large = too_large(model)
+    if large.any() and (large == mobile(model)).all():
+        body = int(large.argmax())
         n = int(np.diff(model.body_vert.numpy())[body])
-        if model.materials[body].kernels is not None and n > LARGEST:
-            name = f"body '{model.labels[body]}'"
-            return f"{name} has {n} vertices, more than {LARGEST}: use a coarser mesh"
+        name = f"body '{model.labels[body]}'"
+        return f"{name} has {n} vertices, more than {implicit_shapes.LARGEST}: use a coarser mesh"
     return ""

@@ -1,6 +1,6 @@
 """Tets that implicit steps crush, or strain too much at once.
 
-An explicit step that is too long shows in the frequency that it is held against. Implicit steps are
+An explicit step that is too long shows in the frequency that it is held against. Implicit ones are
 stable, but they go along the tangent, and impulses reckon with the stiffness at rest: what is flat
 is stiffer than that, and a large strain in one step may add energy. A frame after which tets are
 flatter than before, or strained by more than ``STRAIN`` in a step, is repeated with twice as many
@@ -11,6 +11,7 @@ as this one, or that many, then half as many at least.
 
 import numpy as np
 
+from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.frame import elements
@@ -28,18 +29,24 @@ KEPT = 0.5  # part of the steps that the next frame takes at least
 class Inversion:
     """How flat the tets of each world are, and how often a frame was repeated for it."""
 
-    def __init__(self, model: Model, worlds: Worlds, implicit: bool):
-        """Read the tets once; explicit steps, not ``implicit``, have frequencies for it."""
-        self._implicit = implicit
-        self._tets = model.tets.numpy()
-        self._pose = model.pose.numpy().astype(np.float64)
-        self._volume = 6.0 * model.volume.numpy().astype(np.float64)
-        self._of_tet = worlds.of_vert[self._tets[:, 0]]
-        self._apart = elements.apart(model) if implicit else None
+    def __init__(self, model: Model, worlds: Worlds, shapes: Shapes | None):
+        """Read the tets once, but for those of bodies that take explicit steps.
+
+        These have frequencies for it; without ``shapes`` all have.
+        """
+        self._implicit = shapes is not None
+        tets, volume = model.tets.numpy(), 6.0 * model.volume.numpy().astype(np.float64)
         body = model.vert_body.numpy()
-        volume = np.bincount(body[self._tets[:, 0]], self._volume / 6.0, model.n_body)
+        of_tet = body[tets[:, 0]]
+        lumped = shapes.lumped if shapes else np.ones(model.n_body, dtype=bool)
+        own = np.flatnonzero(~lumped[of_tet])
+        self._tets, self._volume = tets[own], volume[own]
+        self._pose = model.pose.numpy()[own].astype(np.float64)
+        self._of_tet = worlds.of_vert[self._tets[:, 0]]
+        self._apart = elements.apart(model, own) if shapes else None
+        volume = np.bincount(of_tet, volume / 6.0, model.n_body)
         density = np.bincount(body, model.mass.numpy(), model.n_body) / volume
-        self._mass = density[body[self._tets[:, 0]]] * self._volume / 24.0
+        self._mass = density[of_tet[own]] * self._volume / 24.0
         self._n = worlds.n
         self._before = np.zeros(worlds.n)
         self._times = np.zeros(worlds.n, dtype=int)
@@ -51,7 +58,10 @@ class Inversion:
             self._times[:] = 0
 
     def held_against(self, rates: np.ndarray, state: State, dt: np.ndarray) -> np.ndarray:
-        """The ``rates`` [1/s], (2, n_world), which steps ``dt`` [s] are held against."""
+        """What steps ``dt`` [s] are held against [1/s], from the ``rates`` of explicit ones.
+
+        Both have the shape (2, n_world).
+        """
         if not self._implicit:
             return rates
         missing = self._missing(state)
@@ -62,7 +72,8 @@ class Inversion:
         kept = np.where(self._times > 0, KEPT * now, 0.0)
         kept = np.where(missing > 0.0, np.minimum(now, enough), kept)
         self._times += worse
-        return np.stack([np.where(worse, AGAIN * now, kept), rates[1]])
+        slowed = np.where(worse, AGAIN * now, kept)
+        return np.stack([np.maximum(rates[0], slowed), rates[1]])
 
     def _missing(self, state: State) -> np.ndarray:
         """How much of its volume the flat tets lack to be not flat, summed over each world."""

@@ -175,7 +175,8 @@ class Sleeping:
         wp.launch(
             kernels.pause_vertices,
             dim=model.n_vert,
-            inputs=[model.vert_body, model.inv_mass, awake.bodies, self._idle],
+            inputs=[model.vert_body, model.inv_mass, self._turns.inv_mass, awake.bodies]
+            + [self._idle],
             outputs=[awake.inv_mass, state.v, work.forces.received],
         )
         wp.launch(

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import warp as wp
 
+from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
 from warp_contact.frame.krylov import ritz_pairs, start_vectors
 from warp_contact.frame.worlds import Worlds
@@ -42,14 +43,16 @@ class Spectrum:
             times in a few steps, shape (n_world,)
     """
 
-    def __init__(self, model: Model, worlds: Worlds | None = None, implicit: bool = False):
+    def __init__(self, model: Model, worlds: Worlds | None = None, shapes: Shapes | None = None):
         """Allocate about 160 bytes per vertex and 84 per tet on the current device.
 
         ``worlds`` are those that do not depend on each other; without them all bodies are one.
-        ``implicit`` steps are not limited by any rate: none is looked for.
+        Where there are ``shapes``, only bodies that are lumped limit the step: no other is looked
+        at, and nothing is done where there are none.
         """
-        self._implicit = implicit
-        self._model, self.worlds = model, worlds or Worlds(model, apart=False)
+        self._counts = shapes.lumped if shapes else np.ones(model.n_body, dtype=bool)
+        self._model = model = shapes.explicit if shapes else model
+        self.worlds = worlds or Worlds(model, apart=False)
         chunk, body_chunk = _chunks(model.body_vert.numpy())
         self._chunk = wp.array(chunk, dtype=int)
         self._body_chunk = wp.array(body_chunk, dtype=int)
@@ -76,7 +79,7 @@ class Spectrum:
         more than the others until they are found again. Only the worlds ``of``, a mask, are looked
         at; None for all.
         """
-        if self._implicit:
+        if not self._counts.any():
             return np.zeros((2, self.worlds.n))
         of = np.ones(self.worlds.n, dtype=bool) if of is None else of
         change, flat = self._changes(x)
@@ -103,7 +106,7 @@ class Spectrum:
         self._change.zero_()
         inputs = [m.tets, m.vert_body, m.pose, self._before, x, neo_hookean.SQUASHED]
         wp.launch(shape.changes, dim=m.n_tet, inputs=inputs, outputs=[self._change])
-        return self._change.numpy()
+        return np.where(self._counts, self._change.numpy(), 0.0)
 
     def _stale(self, change: np.ndarray) -> np.ndarray:
         """Worlds whose rates do not suffice after such changes of bodies, shape (n_body,)."""

@@ -17,7 +17,9 @@ forces are explicit. They take
     n       = 2^k or 3 2^k >= max(stable, u_b / (STRIDE t_b), RESOLVED) / fps
 
 so that few lengths of steps are in use, each with inverses of its own. u_b is the largest speed of
-anything against body b, t_b its thickness.
+anything against body b, t_b its thickness. Where some bodies take explicit steps beside them,
+omega, t and e are theirs, passing and gentle count too, and n is no smaller than in the last frame
+unless KEEP of the smaller number would do.
 """
 
 import numpy as np
@@ -66,17 +68,24 @@ def steps_in_frame(per_second, fps: float, last):
     return np.maximum(np.maximum(1, kept), np.ceil(per_second / fps)).astype(int)
 
 
-def implicit_steps(omega, crossing, fps: float, rate: float = RESOLVED):
+def implicit_steps(explicit, crossing, fps: float, rate: float = RESOLVED, last=0):
     """Whole implicit steps in a frame.
 
     Args:
-        omega: largest frequency [1/s] of a frame that failed or of a penalty, else 0
+        explicit: steps [1/s] that explicit bodies, a penalty and a frame that failed need, else 0
         crossing: largest speed against a body, over its thickness [1/s]
         fps: frames a second
         rate: steps [1/s] at least
+        last: steps of the last frame where bodies take explicit ones, else 0
     """
-    per_second = np.maximum(np.maximum(omega / (2.0 * SAFETY), crossing / STRIDE), rate)
-    least = np.maximum(per_second / fps, 1.0)
+    per_second = np.maximum(np.maximum(explicit, crossing / STRIDE), rate)
+    kept = np.minimum(last, _usual(explicit / KEEP / fps))
+    return np.maximum(_usual(per_second / fps), kept)
+
+
+def _usual(least):
+    """2^k or 3 2^k steps, no fewer than ``least``."""
+    least = np.maximum(least, 1.0)
     power = 2.0 ** np.floor(np.log2(least))
     return np.ceil(power * np.select([least <= power, least <= 1.5 * power], [1.0, 1.5], 2.0))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.errors import SimulationError
@@ -31,21 +32,23 @@ class StepCount:
         wanted: int | None,
         most: int,
         worlds: Worlds,
-        implicit: bool = False,
+        shapes: Shapes | None = None,
     ):
-        """Read sizes of the bodies once."""
+        """Read sizes of the bodies once; without ``shapes`` all take explicit steps."""
         self.fps = fps
         self.wanted = wanted
         self.most = most
         self._model = model
-        self._implicit = implicit
         self._response = response
         one_pass = isinstance(response, PredictedForce)
         self._rate = step_bounds.ONE_PASS if one_pass else step_bounds.RESOLVED
         self._leaves = not isinstance(response, ContactSurface) or response.search == "literal"
         self._worlds = worlds
         self._thickness = -worlds.most(-model.body_thickness.numpy().astype(np.float64))
-        self._edge = -worlds.most(-model.body_edge.numpy().astype(np.float64))
+        explicit = shapes.lumped if shapes else np.ones(model.n_body, dtype=bool)
+        sizes = np.stack([model.body_thickness.numpy(), model.body_edge.numpy()])
+        self._sizes = -worlds.most(np.where(explicit, -sizes.astype(np.float64), -np.inf))
+        self._implicit, self._mixed = shapes is not None, worlds.most(explicit.astype(int)) > 0
         lightest = np.zeros(worlds.n)
         np.maximum.at(lightest, worlds.of_vert, largest_mobilities(model))
         self._largest_inv_mass = lightest
@@ -70,20 +73,22 @@ class StepCount:
             raise SimulationError(f"frame {frame}: {tet} is too flat: no step is stable")
         if self.wanted:
             return np.full(self._worlds.n, self.wanted)
-        omega, speed = self._with_response(omega), self._speed(state)
-        sizes, overlaps = (self._thickness, self._edge), (last.overlapping > 0) | self._leaves
-        per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
+        pushed = self._worlds.most(self.wrench.accelerations()) / self.fps
+        omega, speed = self._with_response(omega), self._speed(state) + pushed
+        overlaps = (last.overlapping > 0) | self._leaves
+        per_second = step_bounds.steps_per_second(omega, speed, *self._sizes, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
         if self._implicit:
-            given = omega, self._crossing(state), self.fps, self._rate
+            crossing, before = self._crossing(state), np.where(self._mixed, last.n, 0)
+            given = per_second, crossing, self.fps, self._rate, before
             n = step_bounds.implicit_steps(*given).astype(int)
+            per_second = np.maximum(per_second, crossing / step_bounds.STRIDE)
         w = int(n.argmax())
         if n[w] > self.most:
             body = int(np.where(self._worlds.of_body == w, of_bodies, -1.0).argmax())
             cause = self._of_stiffness(state, body, omega[w])
-            if self._implicit:
-                per_second = self._crossing(state) / step_bounds.STRIDE
-            if self._implicit and not isinstance(self._response, Penalty):
+            stiff = self._mixed[w] or isinstance(self._response, Penalty)
+            if self._implicit and not stiff:
                 cause = f"{flattest_tet(self._model, state.x)} is crushed: a stiffer material helps"
             if per_second[w] > step_bounds.PATIENCE * omega[w]:  # the speed asks for them
                 cause = self._of_speed(state, w, speed[w])

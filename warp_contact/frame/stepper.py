@@ -7,6 +7,7 @@ import warp as wp
 
 from warp_contact.data import contact_forces, contacts
 from warp_contact.data.damping import MOST
+from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work, forget
@@ -58,21 +59,21 @@ class Stepper:
         wanted: int | None,
         most: int,
         sleeping: bool,
-        implicit: bool,
+        shapes: Shapes | None,
     ):
-        """Allocate what the steps need, on the current device."""
+        """Allocate what steps need on the current device; without ``shapes`` all are explicit."""
         self.fps, self.wanted, self._model, self._state = fps, wanted, model, state
         may_sleep = sleeping and any(model.gravity)  # else a slow body may be in free flight
         self.worlds = Worlds(model)
         self.last = none_yet(self.worlds.n)
         self.first = state.x.numpy().copy(), state.v.numpy().copy()
-        self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, implicit)
-        self.spectrum = Spectrum(model, self.worlds, implicit)
-        self._inversion = Inversion(model, self.worlds, implicit)
-        self._turns = Turns(model, self.worlds, may_sleep)
+        self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, shapes)
+        self.spectrum = Spectrum(model, self.worlds, shapes)
+        self._inversion = Inversion(model, self.worlds, shapes)
+        self._turns = Turns(shapes.explicit if shapes else model, self.worlds, may_sleep)
         self.sleeping = Sleeping(model, state, fps, self._turns) if may_sleep else None
-        self.buffers = Buffers(model, state, response, self._turns.awake, self.worlds, implicit)
-        self.wrench = self._step_count.wrench = Wrench(self.buffers.shapes, model)
+        self.buffers = Buffers(model, state, response, self._turns.awake, self.worlds, shapes)
+        self.wrench = self._step_count.wrench = Wrench(shapes, model)
         self._start, self._cut = FrameStart(state, self.work), False
         self._first_capacity = self.work.capacity
 

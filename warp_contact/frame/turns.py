@@ -23,13 +23,14 @@ class Turns:
 
     Attributes:
         worlds: those of the scene
+        inv_mass: of vertices that take explicit steps, 0 for the others [1/kg], shape (n_vert,)
         awake: what moves
         idle: worlds of which all bodies sleep, shape (n_world,)
     """
 
     def __init__(self, model: Model, worlds: Worlds, may_sleep: bool):
-        """All have begun, and nothing sleeps."""
-        self._model, self.worlds = model, worlds
+        """All have begun, nothing sleeps; in the ``model`` moves what takes explicit steps."""
+        self._model, self.worlds, self.inv_mass = model, worlds, model.inv_mass
         self.awake = everything(model)
         if worlds.n > 1 or may_sleep:
             self.awake.inv_mass = wp.clone(model.inv_mass)
@@ -78,7 +79,7 @@ class Turns:
         moves, awake = begun[self.worlds.of_body] & self._up, self.awake
         awake.bodies.assign(moves.astype(np.int32))
         awake.tets.assign(moves[self._of_tet].astype(np.int32))
-        inv_mass, of_vert = self._model.inv_mass.numpy(), self._model.vert_body.numpy()
+        inv_mass, of_vert = self.inv_mass.numpy(), self._model.vert_body.numpy()
         awake.inv_mass.assign(np.where(moves[of_vert], inv_mass, np.float32(0.0)))
         work.broad_phase.stale.fill_(1)
 

@@ -6,7 +6,6 @@ from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
-from warp_contact.kernels.implicit.bodies import FREE, RIGID
 from warp_contact.step.implicit import push
 from warp_contact.step.velocity import shift_velocities
 
@@ -23,7 +22,8 @@ class Wrench:
         self._shapes, self._of_vert = shapes, model.vert_body.numpy()
         n = model.n_body
         self._mass = np.bincount(self._of_vert, model.mass.numpy(), n)
-        self._fixed = np.bincount(self._of_vert, model.inv_mass.numpy(), n) == 0.0
+        moving = np.bincount(self._of_vert, model.inv_mass.numpy() > 0.0, n)
+        self._fixed, self._held = moving == 0, moving < np.bincount(self._of_vert, minlength=n)
         self._last, self._next = np.zeros((2, 2, n, 3))
         self._kept = self._last, self._next
 
@@ -37,7 +37,7 @@ class Wrench:
             raise ValueError("it is fixed: give it a velocity")
         if not self._shapes:
             raise ValueError("apply goes with integrator='implicit'")
-        if self._shapes.kind[body] not in (int(FREE), int(RIGID)):
+        if self._held[body]:
             raise ValueError("it has fixed vertices: give them a velocity")
         self._next[:, body] += force, torque
 

@@ -28,8 +28,8 @@ class Measure:
             before: h/2 times the power of internal forces and weight is added, and in free flight
             m (h g)^2 / 8. The sum of all energies is then constant for a linear material in free
             flight, and a contact impulse p changes it by p . (v + v') / 2, v and v' the velocities
-            before and after the step: not at all while the contact stays closed. Implicit steps:
-            from the velocities at that time
+            before and after the step: not at all while the contact stays closed. Of bodies that
+            take implicit steps: from the velocities at that time
         elastic: energy [J]
         gravitational: energy against the origin [J]
         momentum: at the time of the positions [kg m/s], shape (3,)
@@ -142,18 +142,29 @@ class Meter:
 
     def _kinetic(self, state: State, now: np.ndarray, work: Work, dt: np.ndarray) -> float:
         """Kinetic energy [J] of all but rigid bodies, see ``Measure``; ``now`` are v [m/s] then."""
+        explicit, implicit = self.mass, 0.0
         if work.implicit:
-            return float(0.5 * (self.mass @ (now * now)).sum())
+            explicit = np.where(self._lumped(work), self.mass, 0.0)
+            implicit = 0.5 * ((self.mass - explicit) @ (now * now)).sum()
+            if not explicit.any():
+                return float(implicit)
         v = state.v.numpy().astype(np.float64)
-        lagging = 0.5 * (self.mass[:, None] * v * v).sum()
-        power = (self._forces(state.x) * v).sum(axis=1)
+        lagging = implicit + 0.5 * (explicit[:, None] * v * v).sum()
+        power = (np.where(explicit[:, None] > 0.0, self._forces(state.x), 0.0) * v).sum(axis=1)
         pair = _contacts(work)["pair"]
-        mass = np.bincount(self._body, self.mass)
+        mass = np.bincount(self._body, explicit)
         of_bodies = dt[self.model.body_vert.numpy()[:-1]]
         mass[np.unique(pair[pair < len(mass)])] = 0.0
         mass[self._body[self.model.inv_mass.numpy() == 0.0]] = 0.0
         fall = (mass * of_bodies**2).sum() * np.square(self.model.gravity).sum()
         return float(lagging + 0.5 * (dt * power).sum() + 0.125 * fall)
+
+    def _lumped(self, work: Work) -> np.ndarray:
+        """Vertices of bodies that take explicit steps beside implicit ones, a mask, (n_vert,)."""
+        if not work.implicit.lumped:
+            return np.zeros(self.model.n_vert, dtype=bool)
+        moving = self._body[work.implicit.lumped.inv_mass.numpy() > 0.0]
+        return np.isin(self._body, moving)
 
     def _forces(self, x: wp.array) -> np.ndarray:
         """Internal forces and weight [N] of the mobile vertices, shape (n_vert, 3)."""

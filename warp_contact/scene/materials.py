@@ -142,7 +142,7 @@ class SpringNetwork:
 
 @dataclass(frozen=True)
 class Rigid:
-    """A body that does not deform; it makes all steps of its scene implicit.
+    """A body that does not deform; it makes the steps of its scene implicit.
 
     With a density it has mass, centre and moments of inertia of a solid that fills its mesh. Else
     all three are given, as in ``Rigid(mass=2.0, centre=(0, 0, 0), inertia=np.diag([1, 2, 2]))``.

@@ -13,17 +13,30 @@ from warp_contact.step.forces import internal_forces
 
 def predict(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Let forces, weight and damping act on ``state.v`` for a step; set ``work.x`` = x + h v."""
-    if damping_stages > 0:
-        kick_damped(model, state, work, damping_stages)
-    else:
-        kick(model, state, work, work.awake)
+    kick(model, state, work, work.awake, damping_stages)
 
 
-def kick(model: Model, state: State, work: Work, awake: Awake) -> None:
-    """Add the acceleration over ``work.dt`` to ``state.v``, and set ``work.x`` = x + h v."""
+def kick(model: Model, state: State, work: Work, awake: Awake, damping_stages: int = 0) -> None:
+    """Let forces and weight act on ``state.v`` for ``work.dt``, and set ``work.x`` = x + h v.
+
+    Explicit steps are damped in so many stages, implicit ones by their own damping.
+    """
+    explicit = explicit_part(model, work)
+    if explicit and damping_stages > 0:
+        kick_damped(explicit, state, work, damping_stages)
+    elif explicit:
+        _kick_undamped(explicit, state, work, awake)
     if work.implicit:
-        implicit.kick(model, state, work)
-        return implicit.drift(model, state, work, work.x)
+        implicit.kick(work.implicit.deforming, state, work)
+        implicit.drift(model, state, work, work.x)
+
+
+def explicit_part(model: Model, work: Work) -> Model | None:
+    """The model with the tets of bodies that take explicit steps alone; None where none does."""
+    return work.implicit.lumped if work.implicit else model
+
+
+def _kick_undamped(model: Model, state: State, work: Work, awake: Awake) -> None:
     internal_forces(model, state.x, awake.tets, work.f_tet)
     wp.launch(
         motion.kick,

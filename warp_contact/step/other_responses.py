@@ -13,7 +13,7 @@ from warp_contact.kernels.impulse import penalty, predicted, virtual
 from warp_contact.step import broad_phase, impulse, residual, search
 from warp_contact.step.damping import damp_alone
 from warp_contact.step.detection import detect, detect_vertices
-from warp_contact.step.motion import finish, kick, predict
+from warp_contact.step.motion import explicit_part, finish, kick, predict
 from warp_contact.step.response import Penalty, VirtualSurface
 
 
@@ -42,7 +42,7 @@ def step_penalty(
     """
     work.worlds.apart.zero_()
     if damping_stages > 0:
-        damp_alone(model, state, work, damping_stages)
+        damp_alone(explicit_part(model, work), state, work, damping_stages)
     kick(model, state, work, work.awake)
     broad_phase.refresh(model, state.x, state.x, work)
     detect(model, state.x, state.x, work)

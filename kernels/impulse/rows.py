@@ -109,8 +109,11 @@ def rigid_row_sum(
         s += share.of_vert[j]
         arm += share.of_vert[j] * wp.length(x[j] - d.centre[b])
     c = d.inv_inertia[b]  # its norm is at most that of Frobenius
+    norm = wp.sqrt(wp.ddot(c, c))
+    if not wp.isfinite(norm):  # its squares, of a tiny body: the trace is no less
+        norm = wp.trace(c)
     own = wp.length(x[i] - d.centre[b])
-    return ROOM * (d.inv_total[b] * s + wp.sqrt(wp.ddot(c, c)) * own * arm)
+    return ROOM * (d.inv_total[b] * s + norm * own * arm)
 
 
 @wp.func

@@ -164,3 +164,16 @@ def test_what_was_given_does_not_change_afterwards():
     inertia *= 0.0
     assert material == wc.Rigid(mass=1, centre=list(CENTRE), inertia=np.diag([1, 1, 2]))
     assert hash(material) and material.inertia[2][2] == 2.0
+
+
+@pytest.mark.parametrize("edge", [1e-5, 0.1])
+def test_rigid_blocks_of_any_size_stand_on_each_other(edge):
+    scene = wc.Scene(friction=0.3)
+    scene.add_plane((0.0, 0.0, 1.0), 0.0)
+    scene.add_body(wc.box(edge, 2), SOLID, (0.0, 0.0, 0.501 * edge))
+    scene.add_body(wc.box(edge, 2), SOLID, (0.05 * edge, 0.0, 1.503 * edge))
+    sim = wc.Simulation(scene, fps=60.0 * np.sqrt(0.1 / edge), substeps=8)
+    for _ in sim.frames(20):  # alike at all sizes
+        pass
+    assert np.abs(sim.pose(1)[0] / edge - [0.05, 0.0, 1.5]).max() < 5e-3
+    assert sim.measure().overlap < 1e-4 * edge

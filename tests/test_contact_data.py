@@ -136,3 +136,16 @@ def test_before_a_frame_and_after_a_reset_there_is_nothing(device):
     sim.reset()
     assert not sim.forces() and len(sim.contacts()) == 0
     np.testing.assert_array_equal(sim.force_on(0), 0.0)
+
+
+def test_slip_is_the_motion_along_the_surface(device):
+    scene = wc.Scene(friction=0.0)
+    scene.add_plane((0.0, 0.0, 1.0))
+    v = (0.3, -0.2, 0.0)
+    scene.add_body(wc.box(EDGE, 2), RUBBER, (0.0, 0.0, 0.4998 * EDGE), velocity=v)
+    sim = wc.Simulation(scene, fps=240, device=str(device))
+    c = next(sim.contacts() for _ in sim.frames(1))
+    assert len(c) > 0
+    # The base widens a little as the block sinks into its weight.
+    np.testing.assert_allclose(c.slip, np.tile(v, (len(c), 1)), atol=0.02)
+    np.testing.assert_allclose(np.einsum("ci,ci->c", c.slip, c.normal), 0.0, atol=1e-6)

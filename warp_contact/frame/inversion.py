@@ -95,8 +95,8 @@ class Inversion:
             corners = state.x.numpy()[self._tets]
             k = elements.matrices(self._apart, apply_stiffness, corners)[flat]
             size = np.abs(k).sum(axis=2).max(axis=1)  # no eigenvalue is larger
-            with np.errstate(invalid="ignore"):  # of a world that is lost
-                np.maximum.at(most, self._of_tet[flat], np.sqrt(size / self._mass[flat]))
+            size = np.nan_to_num(size, nan=np.inf, posinf=np.inf)
+            np.maximum.at(most, self._of_tet[flat], np.sqrt(size / self._mass[flat]))
         return most
 
     def _strain_rate(self, state: State) -> np.ndarray:

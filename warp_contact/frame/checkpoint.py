@@ -16,7 +16,7 @@ FORMAT = 8
 def fingerprint(model: Model, *settings) -> str:
     """Digest of all that must be the same for a run to continue with the same bits."""
     digest = hashlib.sha256(repr((FORMAT, model.gravity, settings)).encode())
-    arrays = [model.body_vert, model.body_world, model.tets, model.pose, model.mass, model.inv_mass]
+    arrays = [model.body_vert, model.body_world, model.tets, model.mass, model.inv_mass]
     arrays += [model.plane_n, model.plane_h, model.friction]
     for elements in model.elements:
         digest.update(elements.kernels.__name__.encode())

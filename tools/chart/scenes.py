@@ -6,8 +6,7 @@ is one too: a method that keeps bodies apart by a margin has no overlap, and a g
 The motion has no closed form. It is compared with that of the default at ``CONVERGED`` times the
 steps, which half as many change by 1e-4 to 2e-4 of an edge. The reference is our own, so for our
 methods the figure tells how consistent they are. Others confirm it: the stiffest penalty and the
-predicted forces come within 0.3 to 1.2 % of an edge of it. An engine with another law of elasticity
-moves otherwise by the difference of the laws, which no part of this figure takes out.
+predicted forces come within 0.3 to 1.2 % of an edge of it.
 """
 
 from functools import cache

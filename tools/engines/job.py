@@ -31,7 +31,7 @@ def main(make) -> None:
 
 
 def play(make, fps: float, frames: int, stop: int | None, limit: float) -> dict:
-    """The fields of a ``Motion`` but its law, of what ``make()`` returns.
+    """The fields of a ``Motion``, of what ``make()`` returns.
 
     The first frame, which compiles and captures, is not timed. Held vertices stand still after the
     frame ``stop``; the run is given up after ``limit`` wall seconds.

@@ -18,10 +18,10 @@ import numpy as np
 from engines import ours
 from engines.task import Motion, Numbered, Task
 
-ENGINES = {  # their adapters and their laws of elasticity
-    "Newton VBD": ("newton_solvers.py", "neo-hookean"),
-    "Newton XPBD": ("newton_solvers.py", "neo-hookean"),
-    "MuJoCo flex": ("mujoco_flex.py", "st-venant"),
+ENGINES = {  # their adapters
+    "Newton VBD": "newton_solvers.py",
+    "Newton XPBD": "newton_solvers.py",
+    "MuJoCo flex": "mujoco_flex.py",
 }
 KNOBS = {  # and their values, setting by setting; the adapters explain them
     "Newton VBD": {
@@ -83,8 +83,7 @@ def outside(
     task: Task, engine: str, settings: list[dict], python: str, limit: float
 ) -> Iterator[Motion]:
     """The motion of every setting in turn."""
-    adapter, law = ENGINES[engine]
-    command = [python, str(Path(__file__).with_name(adapter)), engine]
+    command = [python, str(Path(__file__).with_name(ENGINES[engine])), engine]
     job = pickle.dumps((plain(task), (task.fps, task.frames, task.stop, limit), settings))
     time = GRACE + limit * len(settings)
     try:
@@ -96,7 +95,7 @@ def outside(
     results = io.BytesIO(found)
     for _ in settings:
         try:
-            yield Motion(law=law, **pickle.load(results))
+            yield Motion(**pickle.load(results))
         except (EOFError, pickle.UnpicklingError):
             yield Motion(reason=reason)
 

@@ -19,7 +19,6 @@ class Motion(NamedTuple):
 
     x: np.ndarray | None = None  # (frames + 1, n, 3) [m], the start included
     v: np.ndarray | None = None  # the same [m/s]
-    law: str = "neo-hookean"  # of elasticity, by which the engine is judged
     wall: float | None = None  # seconds per simulated second, with detection; None if never timed
     startup: float | None = None  # seconds up to the end of the first frame: build, compile or load
     steps: int = 0  # of the last frame

@@ -69,7 +69,7 @@ def test_a_run_beyond_its_time_fails_and_says_how_far_it_came():
 
     motion = ours.run(replace(blocks(), frames=9), ours.DEFAULT, None, 0.0)
     assert motion.reason == "too slow: 2 of 9 frames in 0 s"
-    assert motion.wall > 0.0 and motion.x is None
+    assert motion.cpu > 0.0 and motion.x is None
 
 
 def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
@@ -105,8 +105,8 @@ def test_a_run_that_failed_is_a_point_with_its_reason_in_every_panel():
         raise Failed("bodies apart")
 
     panels = [Panel("A", "title", lambda *_: 0.5), Panel("B", "title", broken)]
-    found = list(pareto.judge(blocks(), panels, "m", "1", Motion(wall=3.0, reason="too slow")))
-    assert [(p.panel, p.outcome, p.wall) for p in found] == [(n, "too slow", 3.0) for n in "AB"]
+    found = list(pareto.judge(blocks(), panels, "m", "1", Motion(cpu=3.0, reason="too slow")))
+    assert [(p.panel, p.outcome, p.cpu) for p in found] == [(n, "too slow", 3.0) for n in "AB"]
     motion = Motion(None, None, 1.0, 0.25, 3)
     first, second = pareto.judge(blocks(), panels, "m", "1", motion)
     assert (first.error, first.outcome, first.startup) == (0.5, "ok", 0.25)

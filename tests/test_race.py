@@ -44,7 +44,7 @@ def test_a_run_without_a_motion_gives_its_reason_and_time():
     import race
     from engines.task import Motion, Task
 
-    motion = Motion(wall=412.3, reason="too slow: 3 of 60 frames in 20 s")
+    motion = Motion(cpu=412.3, reason="too slow: 3 of 60 frames in 20 s")
     cells = race.cells(Task(blocks, 60, 2), motion)
     assert cells == ["", "412", "", "", "too slow: 3 of 60 frames in 20 s"]
 

@@ -1,4 +1,4 @@
-"""Draw error against wall time, for this package and for engines outside.
+"""Draw error against CPU time, for this package and for engines outside.
 
     python tools/pareto.py [task ...] [--out DIR] [--python PATH] [--repeats N]
     python tools/pareto.py --draw FILE
@@ -27,9 +27,10 @@ from measure import machine
 from measure.run import command_line, count, one_of
 
 TASKS = closed_forms.TASKS | {name: scenes.scene(name) for name in scenes.TITLES}
-LIMIT = 12.0  # wall seconds of one run
-HEAD = """Error against wall time, {} run(s) of each, {:.0f} s in all.
+LIMIT = 12.0  # CPU s of one run
+HEAD = """Error against CPU time, {} run(s) of each, {:.0f} s in all.
 {}; outside: {}.
+Times are of the CPU, so that other work on the machine counts little; each engine uses one thread.
 Kernels are compiled and the first frame is stepped before the clock starts. Failures are behind \
 everything. Error and time of a method are those of the same setting."""
 
@@ -75,7 +76,7 @@ def judge(task: Task, panels: list[Panel], method: str, setting: str, motion: Mo
                 error, outcome = panel.error(task, motion), "ok"
         except Failed as failed:
             outcome = str(failed)
-        point = Point(panel.name, method, setting, motion.wall, error, outcome, motion.startup)
+        point = Point(panel.name, method, setting, motion.cpu, error, outcome, motion.startup)
         print(*point, sep="  ", flush=True)
         yield point
 
@@ -83,7 +84,7 @@ def judge(task: Task, panels: list[Panel], method: str, setting: str, motion: Mo
 def middle(same: tuple[Point, ...]) -> Point:
     """Repeats of a point as one; a run that fails once has failed."""
     failed = [p for p in same if p.error is None]
-    return failed[0] if failed else same[0]._replace(wall=median(p.wall for p in same))
+    return failed[0] if failed else same[0]._replace(cpu=median(p.cpu for p in same))
 
 
 def shown(found: list[Point]) -> list[Point]:

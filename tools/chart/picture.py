@@ -1,4 +1,4 @@
-"""The pictures: error against wall time, one panel each, failures on a rail at the top."""
+"""The pictures: error against CPU time, one panel each, failures on a rail at the top."""
 
 from pathlib import Path
 
@@ -60,7 +60,7 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
 def panel(ax, title: str, points: list[Point]) -> None:
     """Points, the front of each method, that of all, and each failure on a rail at the top."""
     title, _, error = title.partition("\n")
-    ax.set(xscale="log", yscale="log", xlabel="wall seconds per simulated second", ylabel=error)
+    ax.set(xscale="log", yscale="log", xlabel="CPU seconds per simulated second", ylabel=error)
     ax.set_title(title, fontsize=15, pad=26)
     ax.xaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
@@ -76,7 +76,7 @@ def panel(ax, title: str, points: list[Point]) -> None:
         ax.text(-0.01, RAIL, "failed", **style)
 
     def draw_all(draw, some: list[Point], **style) -> None:
-        draw([p.wall for p in some], [p.error or floor for p in some], **style)
+        draw([p.cpu for p in some], [p.error or floor for p in some], **style)
 
     draw_all(ax.step, front(points), where="post", color="black", linewidth=6, alpha=0.12)
     for method in reversed(dict.fromkeys(p.method for p in points)):  # the default lies on top
@@ -88,5 +88,5 @@ def panel(ax, title: str, points: list[Point]) -> None:
         draw_all(ax.step, front(mine), where="post", color=colour, linewidth=1.8)
         for p in points:
             if p.method == method and p.error is None:  # at its time, without one at the right end
-                where = blend(ax.transData if p.wall else ax.transAxes, ax.transAxes)
-                ax.plot(p.wall or 1.0, RAIL, transform=where, clip_on=False, mfc="none", **dots)
+                where = blend(ax.transData if p.cpu else ax.transAxes, ax.transAxes)
+                ax.plot(p.cpu or 1.0, RAIL, transform=where, clip_on=False, mfc="none", **dots)

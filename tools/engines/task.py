@@ -19,8 +19,8 @@ class Motion(NamedTuple):
 
     x: np.ndarray | None = None  # (frames + 1, n, 3) [m], the start included
     v: np.ndarray | None = None  # the same [m/s]
-    wall: float | None = None  # seconds per simulated second, with detection; None if never timed
-    startup: float | None = None  # seconds up to the end of the first frame: build, compile or load
+    cpu: float | None = None  # CPU s per simulated s, with detection; None if never timed
+    startup: float | None = None  # CPU s up to the end of the first frame: build, compile or load
     steps: int = 0  # of the last frame
     reason: str = ""
 

@@ -92,7 +92,7 @@ def test_steps_are_multiples_of_those_that_the_same_method_takes(monkeypatch):
     monkeypatch.setattr(ours, "run", run)
     motions = [motion for *_, motion in runs.runs(blocks(), own, {}, "", 1.0)]
     for s, steps in taken.items():
-        assert steps == (None if s.factor == 1 else s.factor * alone[s.method, s.times])
+        assert steps == (s.steps if s.factor == 1 else s.factor * alone[s.method, s.times])
     assert [m.reason for m in motions if m.reason] == ["not finite", "no run with steps x1"]
 
 

@@ -16,7 +16,7 @@ are a fast and a plain one of each engine, in large scenes the fast one.
 import sys
 
 from chart.scenes import overlaps
-from engines.ours import DEFAULT
+from engines.ours import DEFAULT, IMPLICIT
 from engines.runs import SWEEPS, runs, versions
 from engines.task import Motion, Task
 from measure import machine
@@ -29,6 +29,7 @@ from warp_contact.scenes import load
 FPS = 60
 LIMIT = 400.0  # CPU s of one run
 SETTINGS = {"Newton VBD": (1, 5), "Newton XPBD": (8, 4), "MuJoCo flex": (2, 5)}  # fast, plain
+OURS = {DEFAULT.method: "ours", IMPLICIT.method: "ours implicit"}
 COLUMNS = {"scene": 18, "engine": 13, "steps": 6, "s / s": 8, "overlap": 9, "at the end": 10}
 TABLE = Table(**COLUMNS, inverted=0)
 
@@ -63,9 +64,8 @@ def main() -> int:
         build, seconds, count = RACES[name]
         task = Task(build, FPS, round(seconds * FPS))
         others = {e: [SWEEPS[e][k] for k in rows[:count]] for e, rows in SETTINGS.items()}
-        for engine, _, motion in runs(task, [DEFAULT], others, args.python, LIMIT):
-            who = "warp_contact" if engine == DEFAULT.method else engine
-            print(TABLE.line(name, who, *cells(task, motion)), flush=True)
+        for engine, _, motion in runs(task, [DEFAULT, IMPLICIT], others, args.python, LIMIT):
+            print(TABLE.line(name, OURS.get(engine, engine), *cells(task, motion)), flush=True)
     return 0
 
 

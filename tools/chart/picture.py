@@ -12,6 +12,7 @@ from chart.points import Point, front
 rcParams["axes.labelsize"] = 12
 STYLES = {  # method: (colour, marker, what a newcomer is told)
     "default": ("#c8401e", "o", "warp_contact, default"),
+    "implicit": ("#d6559b", "*", "the same, implicit steps"),
     "impulses alone": ("#8a5a9e", "p", "its impulses alone"),
     "predicted": ("#3d9a93", "h", "predicted forces"),
     "literal": ("#e8a33d", "D", "the paper's search, as written"),

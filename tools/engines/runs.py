@@ -62,14 +62,14 @@ def runs(
     """Method, knobs as text and motion of all our ``own`` settings and those of the ``others``.
 
     The others are parts of ``SWEEPS``, their engines those of the interpreter ``python``. A run is
-    given up after ``limit`` CPU seconds. Steps of our own are multiples of those that the same
-    method takes by itself.
+    given up after ``limit`` CPU seconds. Steps of our own are their own, or multiples of those that
+    the same method takes by itself.
     """
     steps = {}
     for setting in own:
         alike = setting.method, setting.times
         if setting.factor == 1:
-            motion = ours.run(task, setting, None, limit)
+            motion = ours.run(task, setting, setting.steps, limit)
             steps[alike] = motion.steps
         elif steps.get(alike):
             motion = ours.run(task, setting, setting.factor * steps[alike], limit)

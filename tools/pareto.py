@@ -8,8 +8,8 @@ given the same coefficient of damping (what each makes of it stands in ``tools/e
 judged by its positions alone. Contact detection is inside the time; compiling, loading and the
 first frame are outside and stand in a column of their own. An engine that is not installed under
 ``--python`` is in the table with that reason. Writes pareto.csv, the pictures pareto.png with all
-panels and summary.png with four of them, and pareto.txt. ``--draw`` measures nothing: it draws the
-pictures of a table again, beside it.
+panels, summary.png with four of them and growth.png (``chart/growth.py``), and pareto.txt.
+``--draw`` measures nothing: it draws the pictures of a table again, beside it.
 """
 
 import sys
@@ -17,7 +17,7 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
-from chart import closed_forms, points, scenes
+from chart import closed_forms, growth, points, scenes
 from chart.panel import Panel
 from chart.points import Point
 from engines import ours
@@ -26,7 +26,7 @@ from engines.task import Failed, Motion, Task
 from measure import machine
 from measure.run import command_line, count, one_of
 
-TASKS = closed_forms.TASKS | {name: scenes.scene(name) for name in scenes.TITLES}
+TASKS = closed_forms.TASKS | {name: scenes.scene(name) for name in scenes.TITLES} | growth.TASKS
 LIMIT = 12.0  # CPU s of one run
 HEAD = """Error against CPU time, {} run(s) of each, {:.0f} s in all.
 {}; outside: {}.
@@ -44,16 +44,17 @@ def main() -> int:
     parser.add_argument("--repeats", type=count, default=3, help="of all; times are medians")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="a table to draw again")
     args = parser.parse_args()
-    chosen = [TASKS[name] for name in args.tasks or TASKS]
-    titles = {panel.name: panel.title for _, panels in chosen for panel in panels}
+    chosen = {name: TASKS[name] for name in args.tasks or TASKS}
+    titles = {panel.name: panel.title for _, panels in chosen.values() for panel in panels}
     if args.draw:
         draw(args.draw.parent, titles, shown(points.read(args.draw)))
         return 0
     begin, rounds, outside = perf_counter(), [], versions(args.python)
     for _ in range(args.repeats):
         rounds.append([])
-        for task, panels in chosen:
-            for run in runs(task, ours.ALL, SWEEPS, args.python, LIMIT):
+        for name, (task, panels) in chosen.items():
+            who = growth.WHO.get(name, (ours.ALL, SWEEPS))
+            for run in runs(task, *who, args.python, LIMIT):
                 rounds[-1] += judge(task, panels, *run)
         # After every round: a long run leaves what it has.
         found = [middle(same) for same in zip(*rounds, strict=True)]
@@ -98,12 +99,17 @@ def shown(found: list[Point]) -> list[Point]:
 
 
 def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:
-    """The picture of all panels and that of four."""
+    """The picture of all panels, that of four, and that of how times grow."""
     from chart import picture  # matplotlib: the table needs none
 
-    picture.draw(folder / "pareto.png", titles, found)
-    if {p.panel for p in found}.issuperset(picture.SUMMARY):
+    there = {p.panel for p in found}
+    errors = {name: title for name, title in titles.items() if name not in growth.TASKS}
+    if errors:
+        picture.draw(folder / "pareto.png", errors, found)
+    if there.issuperset(picture.SUMMARY):
         picture.draw(folder / "summary.png", picture.SUMMARY, found)
+    if there.issuperset(growth.TASKS):
+        growth.draw(folder / "growth.png", found)
 
 
 if __name__ == "__main__":

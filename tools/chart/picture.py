@@ -28,6 +28,7 @@ SUMMARY = {  # panel: its title and what the error is, in the small picture
     "squeezed_sphere": "Squeezed sphere: overlap or gap\noverlap or gap, of an edge",
     "cubes_on_membrane": "Cubes on a membrane: overlap or gap\noverlap or gap, of an edge",
 }
+SECONDS = "CPU seconds per simulated second"
 TITLE = "Error against computing time, same meshes and masses for all; lower left is better"
 FLOOR = 0.1  # an error of zero is drawn at this part of the smallest other one, and marked
 RAIL = 1.035  # height of the rail, of the panel
@@ -44,7 +45,7 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
     for ax, (name, title) in zip(axes.flat, titles.items(), strict=False):
         panel(ax, title, [p for p in points if p.panel == name])
     handles = []
-    for method in dict.fromkeys(p.method for p in points):
+    for method in dict.fromkeys(p.method for p in points if p.panel in titles):
         colour, marker, label = STYLES.get(method, OTHER)
         handles.append(Line2D([], [], color=colour, marker=marker, ms=9.0, label=label))
     grey = {"color": "0.5", "marker": "o", "ls": ""}
@@ -61,7 +62,7 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
 def panel(ax, title: str, points: list[Point]) -> None:
     """Points, the front of each method, that of all, and each failure on a rail at the top."""
     title, _, error = title.partition("\n")
-    ax.set(xscale="log", yscale="log", xlabel="CPU seconds per simulated second", ylabel=error)
+    ax.set(xscale="log", yscale="log", xlabel=SECONDS, ylabel=error)
     ax.set_title(title, fontsize=15, pad=26)
     ax.xaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")

@@ -9,7 +9,7 @@ methods the figure tells how consistent they are. Others confirm it: the stiffes
 predicted forces come within 0.3 to 1.2 % of an edge of it.
 """
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from engines import ours
@@ -48,6 +48,7 @@ def apart(task: Task, motion: Motion) -> float:
     return max(inside(task, motion), gap(task, motion))
 
 
+@lru_cache(maxsize=1)
 def inside(task: Task, motion: Motion) -> float:
     """Deepest overlap after any frame, in edges of the finer body of the two."""
     sound(task, motion)
@@ -86,6 +87,7 @@ def overlaps(task: Task, motion: Motion):
         yield in_edges(sim, measured), measured
 
 
+@lru_cache(maxsize=1)  # panels ask for it in turn
 def gap(task: Task, motion: Motion) -> float:
     """Distance of the worst of the ``PRESSED`` pairs, in edges of its finer body.
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +13,8 @@ class Failed(Exception):
     """A motion that has no error to show; the message is the reason."""
 
 
-class Motion(NamedTuple):
+@dataclass(frozen=True, eq=False)  # each run is itself alone, whatever its arrays
+class Motion:
     """One run, as positions and velocities after each frame, or the reason why there is none."""
 
     x: np.ndarray | None = None  # (frames + 1, n, 3) [m], the start included

@@ -53,8 +53,7 @@ def main() -> int:
     for _ in range(args.repeats):
         rounds.append([])
         for name, (task, panels) in chosen.items():
-            who = growth.WHO.get(name, (ours.ALL, SWEEPS))
-            for run in runs(task, *who, args.python, LIMIT):
+            for run in runs(task, *growth.WHO.get(name, (ours.ALL, SWEEPS)), args.python, LIMIT):
                 rounds[-1] += judge(task, panels, *run)
         # After every round: a long run leaves what it has.
         found = [middle(same) for same in zip(*rounds, strict=True)]

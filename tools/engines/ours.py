@@ -60,9 +60,8 @@ def run(task: Task, setting: Own, substeps: int | None, limit: float) -> Motion:
     """The motion in a task; without ``substeps`` their number is left to the simulation."""
 
     def make() -> Engine:
-        kind = "implicit" if setting.method == "implicit" else "explicit"
-        how = {"device": "cpu", "integrator": kind}
-        sim = Engine(task.scene(), setting.response(task), task.fps, substeps, **how)
+        how = {"integrator": "implicit" if setting.method == "implicit" else "explicit"}
+        sim = Engine(task.scene(), setting.response(task), task.fps, substeps, "cpu", **how)
         sim.state.x.assign(task.start(sim.scene).astype(np.float32))
         return sim
 

@@ -15,6 +15,10 @@ DONE = wp.constant(0)  # nothing
 LAST = wp.constant(1)  # its last sweep of the impulses, a plain one
 RUNNING = wp.constant(2)
 
+# What a contact asks for in its world.
+ANOTHER = wp.constant(1)  # another sweep
+TOO_MANY = wp.constant(2)  # the same, with something to be solved and no sweep left
+
 # Looks for overlaps in a step.
 NO_LOOK = wp.constant(0)  # a stage of all worlds
 FIRST_LOOK = wp.constant(1)  # after the impulses
@@ -29,12 +33,22 @@ class Worlds:
     apart: wp.array[int]  # (n_world,) 1 where no bodies overlapped when the step began
     negligible: wp.array[float]  # (n_world,) [m] a smaller change in a step affects no contact
     doing: wp.array[int]  # (n_world,) RUNNING, LAST or DONE
-    asking: wp.array[int]  # (n_world,) 1 where a contact needs another sweep
+    asking: wp.array[int]  # (n_world,) ANOTHER or TOO_MANY where a contact needs another sweep
+    unsolved: wp.array[int]  # (n_world,) how often there was no sweep left, since the frame began
     open: wp.array[int]  # (n_world,) the last look that found an overlap to be closed
     old: wp.array[int]  # (n_world,) 1 where an overlap is for the search: it is older than the step
     was_old: wp.array[int]  # (n_world,) 1 where there was one since the frame began
     has_new: wp.array[int]  # (n_world,) 1 where the last pass found a new contact of an edge
     sweep: wp.array[int]  # (1,) number of the present sweep
+
+
+@wp.func
+def ask(worlds: Worlds, world: int, most: int, counts: bool):
+    """Ask for another sweep, up to the ``most``; whether it ``counts`` that there is none."""
+    if worlds.sweep[0] < most:
+        worlds.asking[world] = ANOTHER
+    elif counts:
+        worlds.asking[world] = TOO_MANY
 
 
 @wp.kernel
@@ -74,8 +88,10 @@ def next_sweep(
     now = was
     if was == LAST:
         now = DONE
-    elif was == RUNNING and worlds.asking[w] == 0:
+    elif was == RUNNING and worlds.asking[w] != ANOTHER:
         now = wp.where(one_more, LAST, DONE)
+        if worlds.asking[w] == TOO_MANY:
+            worlds.unsolved[w] = worlds.unsolved[w] + 1
     worlds.asking[w] = 0
     worlds.doing[w] = now
     if now == DONE and was != DONE:

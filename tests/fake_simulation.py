@@ -22,7 +22,9 @@ class FakeSimulation:
         self.rest = np.concatenate([x + [2.0 * b, 0.0, 1.0] for b in i]).astype(np.float32)
         flat = np.concatenate([b * len(x) + tets for b in i])
         faces = np.concatenate([b * len(x) + tris for b in i])
-        material = SimpleNamespace(youngs_modulus=1e5, poisson_ratio=0.4, density=1000.0)
+        material = SimpleNamespace(
+            youngs_modulus=1e5, poisson_ratio=0.4, density=1000.0, kernels="soft"
+        )
         free = np.repeat(i > 0, len(x)) if k > 2 else np.ones(k * len(x))
 
         def ints(values, kind=wp.int32):

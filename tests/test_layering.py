@@ -27,8 +27,9 @@ MAY = {  # room: those that it may import, beside itself
     "usd": {"checks", "files"},
     "picture": {"kernels", "usd", "checks"},
     "between_frames": {"data", "scene", "frame", "measure", "exclusive", "checks"},
+    "contact_data": {"data", "scene", "frame", "measure"},
     "simulation": {"data", "scene", "step", "frame", "measure", "between_frames"}
-    | {"errors", "progress", "exclusive", "checks"},
+    | {"contact_data", "errors", "progress", "exclusive", "checks"},
     "__init__": {"scene", "step", "measure", "usd", "simulation", "errors", "interrupts"},
     "command": {"__init__", "errors", "files", "interrupts", "progress", "scene", "step"}
     | {"simulation", "usd", "picture", "checks"},

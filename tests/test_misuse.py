@@ -20,6 +20,7 @@ def test_each_wrong_call_is_refused_in_one_line():
     [
         ("wc.Scene(friction=(0.2, 0.3))", "friction (0.2, 0.3): give a number of 0 or more"),
         ("wc.Simulation(scene(), fps='60')", "fps '60': give a number from 1e-06 to 1e+12"),
+        ("wc.VirtualSurface(0)", "penalty stiffness 0: give a number above 0, from 1e-18 to 1e+18"),
         ("wc.Penalty(-1)", "penalty stiffness -1: give a number above 0, from 1e-18 to 1e+18"),
         ("add(world=2**40)", "world 1099511627776: give a whole number from 0 to 2147483647"),
         ("sim().positions(1.5)", "body 1.5: give a body, its label or its index"),

@@ -98,7 +98,7 @@ _rows = {
     "torque": ("torque of friction across a gap", kernel(constraint, "TURN", -1.0), parts.OBLIQUE),
     "counted": ("weight of that torque in the sweeps", _counted, parts.CORNER),
     "ramp": ("ramps of facets", kernel(tangent, "UPRIGHT", 2.0, constraint), parts.BENT),
-    "planes": ("planes that the closure leaves out", switch("old planes"), parts.SEAM),
+    "planes": ("planes that the closure leaves out", switch("old planes"), parts.PASSING),
     "warm": ("warm start", switch("warm start"), parts.SHEET),
     "hold": ("persistent edges", switch("persistent edges"), parts.BALLS),
     "ahead": ("extrapolation of the sweeps", switch("extrapolation"), parts.DENSE),

@@ -175,6 +175,7 @@ RUNS: dict[str, Callable[[], Run]] = {
     "materials": materials,
     "literal": partial(falling, response=wc.ContactSurface("literal")),
     "penalty": partial(falling, response=wc.Penalty(2000.0, 0.5)),
+    "virtual": partial(falling, response=wc.VirtualSurface(4000.0, 0.5)),
     "predicted": partial(falling, response=wc.PredictedForce()),
     "worlds": worlds,
     "sleeping": sleeping,

@@ -28,6 +28,7 @@ from measure.run import command_line, count, one_of
 
 TASKS = closed_forms.TASKS | {name: scenes.scene(name) for name in scenes.TITLES} | growth.TASKS
 LIMIT = 12.0  # CPU s of one run
+PENALTIES = "penalty", "virtual"
 HEAD = """Error against CPU time, {} run(s) of each, {:.0f} s in all.
 {}; outside: {}.
 Times are of the CPU, so that other work on the machine counts little; each engine uses one thread.
@@ -89,12 +90,10 @@ def middle(same: tuple[Point, ...]) -> Point:
 
 def shown(found: list[Point]) -> list[Point]:
     """Of the penalties of a panel those with the best stiffness only, and everything else."""
-    penalties = [p for p in found if p.method == "penalty" and p.error is not None]
+    penalties = [p for p in found if p.method in PENALTIES and p.error is not None]
     worst_first = sorted(penalties, key=points.BY_ERROR, reverse=True)
-    best = {p.panel: p.setting.partition("steps")[0] for p in worst_first}
-    return [
-        p for p in found if p.method != "penalty" or p.setting.startswith(best.get(p.panel, ""))
-    ]
+    best = {(p.panel, p.method): p.setting.partition("steps")[0] for p in worst_first}
+    return [p for p in found if p.setting.startswith(best.get((p.panel, p.method), ""))]
 
 
 def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:

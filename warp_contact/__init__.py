@@ -2,22 +2,25 @@
 
 from warp_contact import interrupts  # noqa: F401  first, as the others take a second
 from warp_contact.errors import SimulationError
+from warp_contact.measure.contact_data import Contacts, PairForce
 from warp_contact.measure.measure import Measure
 from warp_contact.scene.materials import Corotated, NeoHookean, Rigid, SpringNetwork
 from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.scene import Body, Scene
 from warp_contact.scene.shapes import box, cylinder, dish, sphere
 from warp_contact.simulation import Simulation
-from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.step.response import ContactSurface, Penalty, PredictedForce, VirtualSurface
 from warp_contact.usd.writer import UsdWriter
 
 __all__ = [
     "Body",
     "ContactSurface",
+    "Contacts",
     "Corotated",
     "Measure",
     "MeshError",
     "NeoHookean",
+    "PairForce",
     "Penalty",
     "PredictedForce",
     "Rigid",
@@ -27,6 +30,7 @@ __all__ = [
     "SpringNetwork",
     "TetMesh",
     "UsdWriter",
+    "VirtualSurface",
     "box",
     "cylinder",
     "dish",

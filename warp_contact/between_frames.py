@@ -8,7 +8,7 @@ from warp_contact.data.state import State
 from warp_contact.exclusive import exclusively
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure.measure import Meter
-from warp_contact.scene.pose import pose_of, rigid_motion_of
+from warp_contact.scene.pose import centre_of, pose_of, rigid_motion_of
 from warp_contact.scene.scene import Body, Scene, rotation_matrix
 from warp_contact.scene.selection import Bodies
 from warp_contact.scene.topology import HUGE
@@ -105,11 +105,12 @@ class BetweenFrames:
         mesh = self.scene.bodies[self._bodies.index(body)].mesh
         moved = checks.numbers(position, (3,), "position", HUGE)
         mass = self.model.mass.numpy()[self._bodies.range(body)].astype(np.float64)
-        v, w = rigid_motion_of(self.positions(body), self.velocities(body), mass)
+        x0, v0 = self.positions(body), self.velocities(body)
+        v, w = rigid_motion_of(x0, v0, mass, self._centre(body, x0))
         x = mesh.vertices @ rotation_matrix(rotation).T + moved
         self.set_positions(body, x)
         if not self.scene.bodies[self._bodies.index(body)].fixed.any():
-            self.set_velocity(body, v + np.cross(w, x - np.average(x, axis=0, weights=mass)))
+            self.set_velocity(body, v + np.cross(w, x - self._centre(body, x)))
 
     def apply(
         self, body: Body | int | str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), at=None
@@ -132,12 +133,10 @@ class BetweenFrames:
                 number is not finite
         """
         index = self._bodies.index(body)
-        own = self._bodies.range(body)
         force, torque = checks.numbers(force, (3,), "force"), checks.numbers(torque, (3,), "torque")
-        mass = self.model.mass.numpy()[own].astype(np.float64)
         if at is not None:
-            centre = np.average(self.positions(body), axis=0, weights=mass)
-            torque = torque + np.cross(checks.numbers(at, (3,), "at", HUGE) - centre, force)
+            arm = checks.numbers(at, (3,), "at", HUGE) - self._centre(body, self.positions(body))
+            torque = torque + np.cross(arm, force)
         with exclusively(self.device):
             try:
                 self._stepper.wrench.add(index, force, torque)
@@ -145,3 +144,9 @@ class BetweenFrames:
                 raise ValueError(f"body '{self._bodies.label(index)}': {error}") from None
             if self._stepper.sleeping:
                 self._stepper.sleeping.wake(index)
+
+    def _centre(self, body: Body | int | str, x: np.ndarray) -> np.ndarray:
+        """Centre of mass [m] of a body at ``x``, shape (3,)."""
+        own, index = self._bodies.range(body), self._bodies.index(body)
+        mass = self.model.mass.numpy()[own].astype(np.float64)
+        return centre_of(x, self.model.rest[own], mass, self.model.solids[index])

@@ -8,13 +8,13 @@ import warp as wp
 
 from warp_contact import checks
 from warp_contact.between_frames import BetweenFrames
+from warp_contact.contact_data import ContactData
 from warp_contact.exclusive import exclusively
 from warp_contact.frame import checkpoint, memory
 from warp_contact.frame.integrator import KINDS as INTEGRATORS
 from warp_contact.frame.integrator import choose
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.stepper import Stepper
-from warp_contact.measure.contact_fields import contact_fields
 from warp_contact.measure.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.scene.assemble import assemble
@@ -24,10 +24,11 @@ from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 RATES = 1e-6, 1e12  # of frames [1/s]
 RESPONSES = ContactSurface | Penalty | PredictedForce
-KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce()"
+KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce(), "
+KNOWN += "wc.VirtualSurface(stiffness)"
 
 
-class Simulation(BetweenFrames):
+class Simulation(BetweenFrames, ContactData):
     """Steps a scene frame by frame.
 
     Attributes:
@@ -183,19 +184,9 @@ class Simulation(BetweenFrames):
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""
         with exclusively(self.device):
-            duration = 1.0 / self.fps if self.frame else 0.0
             s = self._stepper
-            return self._meter.measure(self.state, s.velocities(), s.work, duration, s.last_dt)
-
-    def contact_fields(self) -> dict[str, np.ndarray]:
-        """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
-
-        The partner is a body's index, n_body + p for plane p, -1 for none. Partner and penetration
-        are those of the last detection pass: at the predicted positions, after the closure where it
-        moved surfaces, at the start of the step for a penalty. Persistent contacts of edges have no
-        penetration. Shapes (n_vert,).
-        """
-        return contact_fields(self.model, self.state.x, self._stepper.work, 1.0 / self.fps)
+            given = s.velocities(), s.work, self._duration, s.last_dt
+            return self._meter.measure(self.state, *given)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write a checkpoint: a run that continues from it gives the bits of one never interrupted.

@@ -4,7 +4,10 @@
 
 v_l and w are linear and angular velocity, u is the rest of v, Q the rotation by h (w + w') / 2,
 and w' gives the body the angular momentum that it had. Straight lines would make a body that spins
-grow, and a stiff one would turn that into energy.
+grow, and a stiff one would turn that into energy. A rigid body, R q at c at the start of the step,
+gets its shape back, whatever rounding does:
+
+    x' = c' + R' q,  R' = Q R,   v' = v_l + w' x R' q                                 [m], [m/s]
 """
 
 import warp as wp
@@ -18,6 +21,7 @@ from warp_contact.kernels.implicit.bodies import (
     as_vec3d,
     floats,
     moves,
+    rotation,
 )
 from warp_contact.kernels.options import OPTIONS
 
@@ -32,21 +36,9 @@ class Drift:
 
     turn: wp.array[wp.mat33]  # (n_body,) Q
     w: wp.array[wp.vec3]  # (n_body,) [1/s] w'
-
-
-@wp.func
-def rotation(a: wp.vec3d) -> wp.mat33d:
-    """Rotation by the vector a (Rodrigues)."""
-    one = wp.float64(1.0)
-    sq = wp.dot(a, a)
-    s = one - sq / wp.float64(6.0)
-    c = wp.float64(0.5) - sq / wp.float64(24.0)
-    if sq > wp.float64(1.0e-4):
-        t = wp.sqrt(sq)
-        s = wp.sin(t) / t
-        c = (one - wp.cos(t)) / sq
-    k = wp.skew(a)
-    return wp.identity(n=3, dtype=wp.float64) + s * k + c * (k @ k)
+    centre: wp.array[wp.vec3d]  # (n_body,) [m] c' of rigid bodies, empty where there is none
+    lies: wp.array[wp.mat33d]  # (n_body,) R' of the same
+    rate: wp.array[wp.vec3d]  # (n_body,) [1/s] w' of the same
 
 
 @wp.kernel
@@ -72,19 +64,23 @@ def find_drift(
     spin = wp.vec3d()
     rest = wp.vec3d()
     inertia = wp.mat33d()
-    for i in range(first, last):
-        m = wp.float64(d.mass[i])
-        r = x[i] - c
-        u = v[i] - motion.v[b] - wp.cross(w, r)
-        if d.kind[b] == RIGID:  # rounding
-            u = wp.vec3(0.0, 0.0, 0.0)
-        q = as_vec3d(r) + h * as_vec3d(u)
-        inertia += m * (wp.dot(q, q) * wp.identity(n=3, dtype=wp.float64) - wp.outer(q, q))
-        spin += m * wp.cross(as_vec3d(r), as_vec3d(v[i] - motion.v[b]))
-        rest += m * wp.cross(q, as_vec3d(u))
+    before = as_vec3d(w)
+    if d.kind[b] == RIGID:
+        before = d.solids.w[b]
+        lies = d.solids.turn[b]
+        inertia = lies @ d.solids.inertia[b] @ wp.transpose(lies)
+        spin = inertia * before
+    else:
+        for i in range(first, last):
+            m = wp.float64(d.mass[i])
+            r = x[i] - c
+            u = v[i] - motion.v[b] - wp.cross(w, r)
+            q = as_vec3d(r) + h * as_vec3d(u)
+            inertia += m * (wp.dot(q, q) * wp.identity(n=3, dtype=wp.float64) - wp.outer(q, q))
+            spin += m * wp.cross(as_vec3d(r), as_vec3d(v[i] - motion.v[b]))
+            rest += m * wp.cross(q, as_vec3d(u))
     scale = wp.trace(inertia)
     inverse = wp.inverse(inertia / scale)
-    before = as_vec3d(w)
     after = before
     turn = rotation(h * before)
     for _ in range(ROUNDS):
@@ -93,6 +89,12 @@ def find_drift(
         after = turn * (inverse * (back * spin - rest)) / scale
     to.w[b] = as_vec3(after)
     to.turn[b] = as_mat33(turn)
+    if d.kind[b] == RIGID:
+        lies = d.solids.turn[b]
+        at = d.solids.at[b] - lies * d.solids.middle[b]
+        to.centre[b] = at + h * d.solids.v[b]
+        to.lies[b] = turn @ lies
+        to.rate[b] = after
 
 
 @wp.kernel
@@ -116,10 +118,14 @@ def advance(
     if not moves(b, d) or not floats(b, d):
         x_new[i] = x[i] + h * v[i]
         return
+    if d.kind[b] == RIGID:
+        arm = to.lies[b] * as_vec3d(d.rest[i])
+        x_new[i] = as_vec3(to.centre[b] + arm)
+        if turned:
+            v[i] = as_vec3(d.solids.v[b] + wp.cross(to.rate[b], arm))
+        return
     r = x[i] - d.centre[b]
     u = v[i] - motion.v[b] - wp.cross(motion.w[b], r)
-    if d.kind[b] == RIGID:
-        u = wp.vec3(0.0, 0.0, 0.0)
     # What is added is small against x, and is therefore added last.
     q = r + h * u
     moved = to.turn[b] * q

@@ -1,9 +1,8 @@
 """Bodies that take implicit steps: their present shape, as far as their mobility depends on it.
 
     R_i = polar part of F_i,  F_i = sum of volume times deformation gradient of its tets     [m^3]
-    M_r = U^T M U                               mass and moments of inertia          [kg], [kg m^2]
 
-R_i turns the rest shape into the present one around vertex i. U are the rigid motions.
+R_i turns the rest shape into the present one around vertex i.
 """
 
 import warp as wp
@@ -18,9 +17,28 @@ FREE = wp.constant(1)
 HELD = wp.constant(2)  # some of its vertices are fixed
 RIGID = wp.constant(3)
 
+FOUR = wp.constant(4)  # vertices whose answers are summed together: vectors fit into a CPU's
+vec12 = wp.types.vector(length=12, dtype=float)
+mat3x12 = wp.types.matrix(shape=(3, 12), dtype=float)
+
 UPRIGHT = wp.constant(0.05)  # determinant, of a gradient of size 1: above it Newton is fast
 ROUNDS = wp.constant(8)
 EXACT = wp.constant(1.0e-4)  # a last change this small leaves an error of its square
+
+
+@wp.struct
+class Solids:
+    """The bodies that are rigid, see masses.py. All arrays are empty where there is none."""
+
+    inertia: wp.array[wp.mat33d]  # (n_body,) [kg m^2] I_0
+    inverse: wp.array[wp.mat33d]  # (n_body,) [1/(kg m^2)] of I_0
+    middle: wp.array[wp.vec3d]  # (n_body,) [m] q_m
+    spread: wp.array[wp.mat33d]  # (n_body,) [1/(kg m^2)] F
+    inverse_of_vertices: wp.array[wp.mat33d]  # (n_body,) [1/(kg m^2)] of J_0
+    at: wp.array[wp.vec3d]  # (n_body,) [m] x_m
+    turn: wp.array[wp.mat33d]  # (n_body,) R
+    v: wp.array[wp.vec3d]  # (n_body,) [m/s] v_c
+    w: wp.array[wp.vec3d]  # (n_body,) [1/s]
 
 
 @wp.struct
@@ -32,11 +50,11 @@ class Implicit:
     awake: wp.array[int]  # (n_body,) 0 asleep
     body_vert: wp.array[int]  # (n_body + 1,)
     vert_body: wp.array[int]  # (n_vert,)
-    mass: wp.array[float]  # (n_vert,) [kg]
+    mass: wp.array[float]  # (n_vert,) [kg]; weights of the vertices of a rigid body
     inv_mass: wp.array[float]  # (n_vert,) [1/kg], 0 for a fixed vertex
     first: wp.array[int]  # (n_body,) first block of its shape, for its step
-    block: wp.array[wp.mat33]  # (n_block,) B_ij of the shapes, by rows [1/kg]
-    norm: wp.array[float]  # (n_block,) spectral norms of (A0^-1)_ij [1/kg]
+    block: wp.array[mat3x12]  # (n_block,) B_ji of the shapes, by rows i, four at once [1/kg]
+    norm: wp.array[wp.vec4]  # (n_block,) spectral norms of (A0^-1)_ij [1/kg]
     rest: wp.array[wp.vec3]  # (n_vert,) [m] from the centre of mass at rest, as the shape was made
     rest_inertia: wp.array[wp.mat33]  # (n_body,) [1/(kg m^2)] the same, inverted
     placed: wp.array[wp.mat33]  # (n_body,) rotation of its shape when it was placed
@@ -46,6 +64,7 @@ class Implicit:
     inv_inertia: wp.array[wp.mat33]  # (n_body,) [1/(kg m^2)]; 0 for a body that is held
     force: wp.array[wp.vec3]  # (n_body,) [N] from outside
     torque: wp.array[wp.vec3]  # (n_body,) [N m] from outside
+    solids: Solids
 
 
 @wp.struct
@@ -75,6 +94,14 @@ def deforms(b: int, d: Implicit) -> bool:
 
 
 @wp.func
+def block_of(i: int, d: Implicit) -> int:
+    """First block of the four vertices to which vertex i belongs; one follows for each vertex."""
+    b = d.vert_body[i]
+    first = d.body_vert[b]
+    return d.first[b] + (i - first) // FOUR * (d.body_vert[b + 1] - first)
+
+
+@wp.func
 def rigid_at(i: int, b: int, x: wp.vec3, d: Implicit, motion: RigidMotion) -> wp.vec3:
     """Velocity [m/s] of the rigid motion of body b at its vertex i."""
     return motion.v[b] + wp.cross(motion.w[b], x - d.centre[b])
@@ -97,6 +124,15 @@ def as_vec3(a: wp.vec3d) -> wp.vec3:
 
 
 @wp.func
+def as_mat33d(a: wp.mat33) -> wp.mat33d:
+    out = wp.mat33d()
+    for k in range(3):
+        for l in range(3):
+            out[k, l] = wp.float64(a[k, l])
+    return out
+
+
+@wp.func
 def as_mat33(a: wp.mat33d) -> wp.mat33:
     out = wp.mat33(0.0)
     for k in range(3):
@@ -106,50 +142,18 @@ def as_mat33(a: wp.mat33d) -> wp.mat33:
 
 
 @wp.func
-def centre_of(b: int, x: wp.array[wp.vec3], d: Implicit) -> wp.vec3:
-    """Centre of mass of body b [m]."""
-    first = d.body_vert[b]
-    origin = x[first]
-    total = wp.float64(0.0)
-    moment = wp.vec3d()
-    for i in range(first, d.body_vert[b + 1]):
-        m = wp.float64(d.mass[i])
-        total += m
-        moment += m * as_vec3d(x[i] - origin)
-    return origin + as_vec3(moment / total)
-
-
-@wp.kernel
-def find_bodies(
-    # in
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    # in, out
-    d: Implicit,
-):
-    """One thread per body: its centre, mass and inertia at the present shape."""
-    b = wp.tid()
-    d.inv_total[b] = 0.0
-    d.inv_inertia[b] = wp.mat33(0.0)
-    if not moves(b, d):
-        return
-    first = d.body_vert[b]
-    last = d.body_vert[b + 1]
-    c = centre_of(b, x, d)
-    d.centre[b] = c
-    if d.kind[b] == HELD:
-        return
-    total = wp.float64(0.0)
-    inertia = wp.mat33d()
-    for i in range(first, last):
-        total += wp.float64(d.mass[i])
-        r = as_vec3d(x[i] - c)
-        inertia += wp.float64(d.mass[i]) * (
-            wp.dot(r, r) * wp.identity(n=3, dtype=wp.float64) - wp.outer(r, r)
-        )
-    scale = wp.trace(inertia)
-    inverse = wp.inverse(inertia / scale)
-    d.inv_total[b] = wp.float32(wp.float64(1.0) / total)
-    d.inv_inertia[b] = as_mat33(inverse / scale)
+def rotation(a: wp.vec3d) -> wp.mat33d:
+    """Rotation by the vector a (Rodrigues)."""
+    one = wp.float64(1.0)
+    sq = wp.dot(a, a)
+    s = one - sq / wp.float64(6.0)
+    c = wp.float64(0.5) - sq / wp.float64(24.0)
+    if sq > wp.float64(1.0e-4):
+        t = wp.sqrt(sq)
+        s = wp.sin(t) / t
+        c = (one - wp.cos(t)) / sq
+    k = wp.skew(a)
+    return wp.identity(n=3, dtype=wp.float64) + s * k + c * (k @ k)
 
 
 @wp.kernel
@@ -210,32 +214,3 @@ def find_turns(
     for k in range(vt_start[i], vt_start[i + 1]):
         f += gradient[vt_corner[k] // 4]
     d.turn[i] = polar(f) @ d.placed[b]
-
-
-@wp.kernel
-def keep_shapes(
-    # in
-    d: Implicit,
-    # in, out
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-):
-    """One thread per rigid body: the shape at rest, moved to where the body is.
-
-    Without it, rounding would change the shape over many steps.
-    """
-    b = wp.tid()
-    if d.kind[b] != RIGID or d.awake[b] == 0:
-        return
-    first = d.body_vert[b]
-    last = d.body_vert[b + 1]
-    c = centre_of(b, x, d)
-    now = wp.mat33d()
-    before = wp.mat33d()
-    for i in range(first, last):
-        r = as_vec3d(d.rest[i])
-        now += wp.float64(d.mass[i]) * wp.outer(as_vec3d(x[i] - c), r)
-        before += wp.float64(d.mass[i]) * wp.outer(r, r)
-    scale = wp.trace(before)
-    turn = polar(as_mat33((now / scale) * wp.inverse(before / scale)))
-    for i in range(first, last):
-        x[i] = c + turn * d.rest[i]

@@ -17,15 +17,19 @@ linear and angular momentum of the impulses, whatever S is. A body with fixed ve
 import warp as wp
 
 from warp_contact.kernels.implicit.bodies import (
+    FOUR,
     RIGID,
     Implicit,
     RigidMotion,
     as_vec3,
     as_vec3d,
+    block_of,
     floats,
     moves,
     rigid_at,
+    vec12,
 )
+from warp_contact.kernels.implicit.masses import find_solid_motion
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -61,7 +65,7 @@ def find_response(
 def find_rigid_part(
     b: int, y: wp.array[wp.vec3], x: wp.array[wp.vec3], d: Implicit, motion: RigidMotion
 ):
-    """Set the rigid part of velocities y [m/s] of body b."""
+    """Set the rigid part of velocities y [m/s] of body b, which deforms."""
     c = d.centre[b]
     total = wp.vec3d()
     turning = wp.vec3d()
@@ -92,13 +96,18 @@ def rigid_part(
     # in
     y: wp.array[wp.vec3],  # (n_vert,) [m/s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
-    d: Implicit,
+    # in, out
+    d: Implicit,  # of rigid bodies v and w
     # out
     motion: RigidMotion,
 ):
     """One thread per body without fixed vertices: the rigid part of velocities."""
     b = wp.tid()
-    if moves(b, d) and floats(b, d):
+    if not moves(b, d) or not floats(b, d):
+        return
+    if d.kind[b] == RIGID:
+        find_solid_motion(b, y, x, d, motion)
+    else:
         find_rigid_part(b, y, x, d, motion)
 
 
@@ -153,18 +162,30 @@ def multiply(
     # out
     y: wp.array[wp.vec3],  # (n_vert,) [m/s]
 ):
-    """One thread per vertex: R A0^-1 z."""
-    i = wp.tid()
-    b = d.vert_body[i]
-    if busy[b] == 0 or d.kind[b] == RIGID:
-        return
+    """One thread per vertex: R A0^-1 z; the first quarter of those of a body have four each."""
+    t = wp.tid()
+    b = d.vert_body[t]
     first = d.body_vert[b]
-    n = d.body_vert[b + 1] - first
-    row = d.first[b] + (i - first) * n
-    s = rest.v[b] + wp.cross(rest.w[b], d.rest[i])
-    for j in range(n):
-        s += d.block[row + j] * z[first + j]
-    y[i] = d.turn[i] * s
+    last = d.body_vert[b + 1]
+    own = first + FOUR * (t - first)
+    if busy[b] == 0 or d.kind[b] == RIGID or own >= last:
+        return
+    at = block_of(own, d) - first
+    by_x = vec12()  # three sums, of which none waits for another
+    by_y = vec12()
+    by_z = vec12()
+    for j in range(first, last):
+        rows = d.block[at + j]
+        q = z[j]
+        by_x += rows[0] * q[0]
+        by_y += rows[1] * q[1]
+        by_z += rows[2] * q[2]
+    s = by_x + by_y + by_z
+    for k in range(FOUR):
+        i = own + k
+        if i < last:
+            u = rest.v[b] + wp.cross(rest.w[b], d.rest[i])
+            y[i] = d.turn[i] * (u + wp.vec3(s[3 * k], s[3 * k + 1], s[3 * k + 2]))
 
 
 @wp.kernel

@@ -9,6 +9,7 @@ faster than the step may gain energy where shapes change. u is what an implicit 
 of v: all of a motion with z = (h omega)^2 >> 1, a part z of one with z << 1. T = 1 damps it by
 1 - z^2 a step for z << 1 and by 2 / z for z >> 1. A body without fixed vertices gets its rigid
 motion from outside forces alone: internal ones have no resultant, and rounding gives them none.
+A rigid one has no other.
 """
 
 import warp as wp
@@ -18,6 +19,7 @@ from warp_contact.kernels.implicit.bodies import (
     Implicit,
     RigidMotion,
     acceleration,
+    deforms,
     floats,
     moves,
     rigid_at,
@@ -44,7 +46,7 @@ def sum_forces(
     """One thread per vertex: f - C v."""
     i = wp.tid()
     f[i] = wp.vec3(0.0, 0.0, 0.0)
-    if d.inv_mass[i] > 0.0 and moves(d.vert_body[i], d):
+    if d.inv_mass[i] > 0.0 and deforms(d.vert_body[i], d):
         f[i] = corner_sum(i, vt_start, vt_corner, f_tet)
         if damped.shape[0] > 0:
             f[i] = f[i] - corner_sum(i, vt_start, vt_corner, damped)
@@ -77,7 +79,7 @@ def momenta(
     """One thread per vertex: M v - A v_c."""
     i = wp.tid()
     p[i] = wp.vec3(0.0, 0.0, 0.0)
-    if d.inv_mass[i] > 0.0 and moves(d.vert_body[i], d):
+    if d.inv_mass[i] > 0.0 and deforms(d.vert_body[i], d):
         p[i] = d.mass[i] * v[i]
         if of_fixed.shape[0] > 0:
             p[i] = p[i] - of_fixed[i]
@@ -95,7 +97,7 @@ def unresolved(
     """One thread per vertex: u."""
     i = wp.tid()
     u[i] = wp.vec3(0.0, 0.0, 0.0)
-    if d.inv_mass[i] > 0.0 and moves(d.vert_body[i], d):
+    if d.inv_mass[i] > 0.0 and deforms(d.vert_body[i], d):
         u[i] = v[i] - resolved[i]
 
 
@@ -115,7 +117,7 @@ def load(
     i = wp.tid()
     b = d.vert_body[i]
     r[i] = wp.vec3(0.0, 0.0, 0.0)
-    if d.inv_mass[i] > 0.0 and moves(b, d):
+    if d.inv_mass[i] > 0.0 and deforms(b, d):
         h = d.h[b]
         s = h * f[i] - DAMPED * h * h * corner_sum(i, vt_start, vt_corner, stiff)
         if d.kind[b] == HELD:
@@ -135,7 +137,7 @@ def remove_rigid(
     """One thread per vertex: P^T r."""
     i = wp.tid()
     b = d.vert_body[i]
-    if moves(b, d) and floats(b, d):
+    if deforms(b, d) and floats(b, d):
         r[i] = r[i] - d.mass[i] * rigid_at(i, b, x[i], d, motion)
 
 

@@ -6,11 +6,14 @@ The mobility G of mobility.py is the preconditioner. A is indefinite where tets 
 a body ends where a direction of negative curvature comes up. In free flight r is what rounding of
 positions by ROUNDING |x| does to forces, about (1 / G_ii - m_i) / h for each vertex: a body ends
 where r . G r is no larger than that.
+
+The last product G r, which says what is left, is not lost: where an iteration left little, G r is
+almost what is missing in dv. It is added, and leaves about the same part as that iteration.
 """
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import RIGID, Implicit, moves
+from warp_contact.kernels.implicit.bodies import FOUR, RIGID, Implicit, block_of, moves
 from warp_contact.kernels.motion.motion import corner_sum
 from warp_contact.kernels.options import OPTIONS
 
@@ -18,6 +21,7 @@ wp.set_module_options(OPTIONS)
 
 TOLERANCE = wp.constant(1.0e-3)  # of the first residual, in the norm of G
 ROUNDING = wp.constant(2.5e-7)  # of a coordinate, in float32, and what follows from it
+NEAR = wp.constant(0.1)  # part of r . G r that is left: less, and G is almost the inverse of A
 ITERATIONS = wp.constant(16)  # at most: two are usual
 
 
@@ -90,10 +94,8 @@ def begin(
         return
     noise = wp.float64(0.0)
     if d.kind[b] != RIGID:
-        at = d.first[b]
-        n = last - first
         for i in range(first, last):
-            g = d.norm[at + (i - first) * (n + 1)]
+            g = d.norm[block_of(i, d) + i - first][(i - first) % FOUR]
             if g > 0.0:
                 p_i = (1.0 / g - d.mass[i]) / d.h[b] * ROUNDING * wp.length(x[i])
                 noise += wp.float64(g * p_i * p_i)
@@ -146,23 +148,30 @@ def look(
     # in, out
     to: Iteration,
     p: wp.array[wp.vec3],  # (n_vert,) [m/s]
+    dv: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out, added to
     running: wp.array[int],  # (1,) bodies that go on
 ):
-    """One thread per body: whether it has converged; else the next direction."""
+    """One thread per body: whether it has converged when z is added; else the next direction."""
     b = wp.tid()
     if to.going[b] == 0:
         return
     first = d.body_vert[b]
     last = d.body_vert[b + 1]
     rz = inner(r, z, first, last)
-    if to.going[b] < 0 or rz <= to.enough[b] or to.going[b] == ITERATIONS:
+    keep = wp.float32(rz / to.now[b])
+    near = to.going[b] > 0 and keep < NEAR
+    left = rz
+    if near:
+        left = wp.float64(keep) * rz  # with z added
+    if to.going[b] < 0 or left <= to.enough[b] or to.going[b] == ITERATIONS:
         to.going[b] = 0
         wp.atomic_sub(running, 0, 1)
         for i in range(first, last):  # nothing of it is multiplied any more
             p[i] = wp.vec3(0.0, 0.0, 0.0)
+            if near:
+                dv[i] = dv[i] + z[i]
         return
-    keep = wp.float32(rz / to.now[b])
     to.now[b] = rz
     to.going[b] = to.going[b] + 1
     for i in range(first, last):

@@ -66,11 +66,17 @@ def inverse_mass(c: Contact, graph: ContactGraph, bodies: Mobility) -> float:
     return w
 
 
+@wp.func
+def coefficient(pair: wp.vec2i, friction: wp.array[float]) -> float:
+    """Coulomb coefficient between two bodies: the mean of theirs."""
+    return 0.5 * (friction[pair[0]] + friction[pair[1]])
+
+
 @wp.kernel
 def begin_contacts(
     # in
     threads: int,
-    friction: float,  # coefficient
+    friction: wp.array[float],  # (n_body + n_plane,)
     first: wp.array[int],  # (1,) contacts before this one keep their impulses
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -91,7 +97,7 @@ def begin_contacts(
         to.inv_mass_turning = w
         to.gap = gap(at, x0)
         to.gap_bound = (to.gap - REST_GAP * at.edge_length) / dt[at.vert[0]]
-        to.friction = friction
+        to.friction = coefficient(at.pair, friction)
         largest = float(0.0)
         if w > 0.0 and not at.on_plane:
             for k in range(5):

@@ -1,26 +1,14 @@
 """Stage 5, impulses, where some bodies take implicit steps: all contacts at once, by row sums.
 
-    dv = G p                                    p summed over the contacts of a vertex  [m/s]
-
 The sweeps are those of impulse.py, with the bounds of rows.py. A contact that begins to approach
 waits for a sweep, until the row sums count it.
 
-Within the sweeps only touched vertices matter: there G is R A0^-1 R^T with the rigid part of A0^-1
-replaced by that at the present shape. The sum of all impulses then moves all vertices by G itself.
-The two differ only where a body is bent or sheared, by what the sweeps of this step added.
+Within the sweeps only touched vertices move, then the sum of all impulses moves all (touched.py).
 """
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import (
-    LUMPED,
-    RIGID,
-    Implicit,
-    RigidMotion,
-    as_vec3,
-    as_vec3d,
-    moves,
-)
+from warp_contact.kernels.implicit.bodies import LUMPED, Implicit
 from warp_contact.kernels.impulse.constraint import Constraint, Impulse
 from warp_contact.kernels.impulse.impulse import (
     Limits,
@@ -31,11 +19,11 @@ from warp_contact.kernels.impulse.impulse import (
     projected,
     surface_velocity,
 )
-from warp_contact.kernels.impulse.rows import Touched, row_sum, row_weight, share_of
+from warp_contact.kernels.impulse.rows import row_weight
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, total
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.worlds import DONE, LAST, Worlds
+from warp_contact.kernels.worlds import DONE, LAST, Worlds, ask
 
 wp.set_module_options(OPTIONS)
 
@@ -108,14 +96,15 @@ def solve_contacts(
         excess = un + wp.max(to.gap_bound, 0.0)
         before = impulse[c]
         w = row_weight(at, row) * (to.inv_mass_turning / to.inv_mass)
+        h = dt[at.vert[0]]
+        approach = limits.tolerance * wp.min(USUAL * h, 1.0) * at.edge_length
         pushes = before.ahead[3] > 0.0 or excess < 0.0
         if counted[c] == 0:
             busy[c] = 0
             clear_parts(c, part)
             if pushes and not last:
                 counted[c] = 2  # the row sums will count it in the next sweep
-                if sweep < limits.sweeps:
-                    worlds.asking[world] = 1
+                ask(worlds, world, limits.sweeps, -excess * h > approach)
                 for k in range(5):
                     served[at.vert[k]] = sweep
             continue
@@ -123,11 +112,11 @@ def solve_contacts(
         if not pushes and sweep % RECOUNT == 0:
             counted[c] = 0
         new = projected(before, u, un, excess, n, to, w)
-        off = wp.abs(new.normal - before.ahead[3]) * w
-        h = dt[at.vert[0]]
-        approach = limits.tolerance * wp.min(USUAL * h, 1.0) * at.edge_length
-        if off * h > approach and sweep < limits.sweeps:
-            worlds.asking[world] = 1
+        y = before.ahead
+        rubbed = wp.length(new.friction - wp.vec3(y[0], y[1], y[2]))
+        off = wp.max(wp.abs(new.normal - y[3]), rubbed) * w
+        if off * h > approach:
+            ask(worlds, world, limits.sweeps, True)
         beta = float(0.0)
         if not last:
             beta = limits.extrapolation * float(sweep - 1) / float(sweep + 2)
@@ -136,111 +125,6 @@ def solve_contacts(
         negligible = worlds.negligible[world]
         busy[c] = wp.where(wp.length(change) * w * h > negligible, 2, 1)
         impulse[c] = new
-
-
-@wp.kernel
-def respond(
-    # in
-    threads: int,
-    worlds: Worlds,
-    graph: ContactGraph,
-    contact: wp.array[Contact],  # (capacity,)
-    counted: wp.array[int],  # (capacity,)
-    part: wp.array[wp.vec3],  # (5 capacity,) [kg y]
-    served: wp.array[int],  # (n_vert,) this sweep where it adds something
-    touched: Touched,
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    d: Implicit,
-    # out
-    busy: wp.array[int],  # (n_body,) 1 where this sweep adds something, 2 where shares change
-    motion: RigidMotion,  # by what it adds
-    z: wp.array[wp.vec3],  # (n_vert,) [kg y] R^T p
-    # in, out
-    share: wp.array[float],  # (n_vert,)
-    # out, added to
-    sum: wp.array[wp.vec3],  # (n_vert,) [kg y] of all sweeps
-):
-    """For each body in a world that sweeps: what this sweep adds at its vertices."""
-    sweep = worlds.sweep[0]
-    for b in range(wp.tid(), touched.n.shape[0], threads):
-        first = d.body_vert[b]
-        busy[b] = 0
-        if touched.n[b] == 0 or worlds.doing[worlds.of_vert[first]] == DONE:
-            continue
-        for k in range(touched.n[b]):
-            if served[touched.vert[first + k]] == sweep:
-                busy[b] = 1
-                break
-        if busy[b] == 0:
-            continue
-        as_whole = moves(b, d)
-        pushed = wp.vec3d()
-        turning = wp.vec3d()
-        for k in range(touched.n[b]):
-            i = touched.vert[first + k]
-            s = share_of(i, graph, contact, counted)
-            if s != share[i]:
-                busy[b] = 2
-                share[i] = s
-            z[i] = wp.vec3(0.0, 0.0, 0.0)
-            if served[i] == sweep:
-                p = total(i, graph, part)
-                sum[i] = sum[i] + p
-                if as_whole:
-                    pushed += as_vec3d(p)
-                    turning += wp.cross(as_vec3d(x[i] - d.centre[b]), as_vec3d(p))
-                    z[i] = wp.transpose(d.turn[i]) * p
-                else:
-                    z[i] = p
-        if as_whole:
-            motion.v[b] = d.inv_total[b] * as_vec3(pushed)
-            motion.w[b] = d.inv_inertia[b] * as_vec3(turning)
-
-
-@wp.kernel
-def move(
-    # in
-    threads: int,
-    worlds: Worlds,
-    dt: wp.array[float],  # (n_vert,) [s]
-    graph: ContactGraph,
-    touched: Touched,
-    x: wp.array[wp.vec3],  # (n_vert,) [m]
-    z: wp.array[wp.vec3],  # (n_vert,) [kg y]
-    share: wp.array[float],  # (n_vert,)
-    busy: wp.array[int],  # (n_body,)
-    motion: RigidMotion,  # by what this sweep adds
-    d: Implicit,
-    # in, out
-    y: wp.array[wp.vec3],  # (n_vert,) velocities or positions
-    # out
-    row: wp.array[float],  # (n_vert,) [1/kg]
-    changed: wp.array[int],  # (n_vert,) this sweep where it changed y, else an older one
-):
-    """For each vertex with contacts, of a body that is busy: how it answers, and its row sum."""
-    sweep = worlds.sweep[0]
-    for k in range(wp.tid(), graph.n_touched[0], threads):
-        i = graph.touched[k]
-        b = d.vert_body[i]
-        if busy[b] == 0 or d.inv_mass[i] == 0.0:
-            continue
-        if busy[b] == 2:
-            row[i] = row_sum(i, share, touched, x, d)
-        u = d.inv_mass[i] * z[i]
-        if moves(b, d):
-            first = d.body_vert[b]
-            at = d.first[b] + (i - first) * (d.body_vert[b + 1] - first) - first
-            u = wp.vec3(0.0, 0.0, 0.0)
-            if d.kind[b] != RIGID:
-                for l in range(touched.n[b]):
-                    j = touched.vert[first + l]
-                    u += d.block[at + j] * z[j]
-                u = d.turn[i] * u
-            u += motion.v[b] + wp.cross(motion.w[b], x[i] - d.centre[b])
-        y[i] = y[i] + u
-        changed[i] = wp.where(
-            wp.length(u) * dt[i] > worlds.negligible[worlds.of_vert[i]], sweep, changed[i]
-        )
 
 
 @wp.kernel
@@ -283,12 +167,12 @@ def add(
     # in
     before: wp.array[wp.vec3],  # (n_vert,) y before the sweeps
     p: wp.array[wp.vec3],  # (n_vert,) [kg y]
-    answer: wp.array[wp.vec3],  # (n_vert,) G p of bodies that take implicit steps
+    answer: wp.array[wp.vec3],  # (n_vert,) of bodies that take implicit steps
     d: Implicit,
     # out
     y: wp.array[wp.vec3],  # (n_vert,) velocities or positions
 ):
-    """One thread per vertex: add G p."""
+    """One thread per vertex: add what the impulses change."""
     i = wp.tid()
     if d.inv_mass[i] == 0.0:
         y[i] = before[i]

@@ -23,11 +23,12 @@ import warp as wp
 
 from warp_contact.kernels.impulse.constraint import Constraint, Impulse
 from warp_contact.kernels.impulse.tangent import allowed
+from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
 from warp_contact.kernels.mobility import Mobility, mobility_of
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph, takes_part, total
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.worlds import DONE, LAST, Worlds
+from warp_contact.kernels.worlds import DONE, LAST, Worlds, ask
 
 wp.set_module_options(OPTIONS)
 
@@ -171,9 +172,9 @@ def solve_contacts(
         excess = un + wp.max(to.gap_bound, 0.0)
         before = impulse[c]
         new = projected(before, u, un, excess, n, to, w)
-        off = wp.abs(new.normal - before.ahead[3]) * w
-        if off * dt[at.vert[0]] > limits.tolerance * at.edge_length and sweep < limits.sweeps:
-            worlds.asking[world] = 1
+        off = wp.abs(new.normal - before.ahead[3]) * w * dt[at.vert[0]]
+        if off > limits.tolerance * at.edge_length:
+            ask(worlds, world, limits.sweeps, off > CLOSURE_TOLERANCE * at.edge_length)
         beta = float(0.0)
         if not last:
             beta = limits.extrapolation * float(sweep - 1) / float(sweep + 2)

@@ -9,7 +9,9 @@ velocity, without the turning of the surface.
 import warp as wp
 
 from warp_contact.kernels.impulse.constraint import Constraint, Impulse
+from warp_contact.kernels.impulse.impulse import part_of
 from warp_contact.kernels.impulse.tangent import clamped
+from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -29,3 +31,10 @@ def with_friction(
     if normal > 0.0:
         out.friction = clamped(-(u - wp.dot(u, n) * n) / to.inv_mass_turning, mu * normal)
     return out
+
+
+@wp.func
+def give(c: int, given: Impulse, at: Contact, to: Constraint, part: wp.array[wp.vec3]):
+    """Set the parts of contact c at its vertices."""
+    for k in range(5):
+        part[5 * c + k] = part_of(k, at, to, given.normal * at.normal + given.friction)

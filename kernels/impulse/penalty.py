@@ -7,22 +7,37 @@ Heidelberger et al. 2004, with Coulomb friction as in Keiser et al. 2004 (one_pa
 
 import warp as wp
 
-from warp_contact.kernels.impulse.constraint import Constraint, Impulse
-from warp_contact.kernels.impulse.impulse import part_of
-from warp_contact.kernels.impulse.one_pass import with_friction
+from warp_contact.kernels.impulse.constraint import Constraint, Impulse, coefficient
+from warp_contact.kernels.impulse.one_pass import give, with_friction
 from warp_contact.kernels.narrow_phase.contact import Contact, relative_velocity
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
 
+@wp.func
+def impulse_of_spring(
+    length: float,  # that it is pressed by [m]; without force if not above 0
+    spring: wp.vec2,  # stiffness [N/m], damping [N s/m]
+    mu: float,
+    h: float,  # [s]
+    u: wp.vec3,  # [m/s]
+    n: wp.vec3,
+    to: Constraint,
+) -> Impulse:
+    """The impulse of a spring along n over one step, with friction."""
+    p = float(0.0)
+    if to.inv_mass_turning > 0.0 and length > 0.0:
+        p = h * wp.max(spring[0] * length - spring[1] * wp.dot(u, n), 0.0)
+    return with_friction(p, n, u, mu, to)
+
+
 @wp.kernel
 def penalty_impulses(
     # in
     threads: int,
-    stiffness: float,  # [N/m]
-    damping: float,  # [N s/m]
-    mu: float,
+    spring: wp.vec2,  # stiffness [N/m], damping [N s/m]
+    friction: wp.array[float],  # (n_body + n_plane,) Coulomb coefficients
     dt: wp.array[float],  # (n_vert,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -35,12 +50,9 @@ def penalty_impulses(
     """For each contact: the impulse of the penalty force over one step."""
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
-        to = constraint[c]
         u = relative_velocity(at, v)
-        p = float(0.0)
-        if to.inv_mass_turning > 0.0 and at.depth > 0.0:
-            p = dt[at.vert[0]] * wp.max(stiffness * at.depth - damping * wp.dot(u, at.normal), 0.0)
-        given = with_friction(p, at.normal, u, mu, to)
-        for k in range(5):
-            part[5 * c + k] = part_of(k, at, to, given.normal * at.normal + given.friction)
+        h = dt[at.vert[0]]
+        mu = coefficient(at.pair, friction)
+        given = impulse_of_spring(at.depth, spring, mu, h, u, at.normal, constraint[c])
         impulse[c] = given
+        give(c, given, at, constraint[c], part)

@@ -9,14 +9,15 @@ of the idea with the contacts of this package:
 
 with W of constraint.py, where N_k contacts share vertex k. A single contact closes exactly: F moves
 its two sides by h^2 W F relative to each other. Where N contacts need the same of a vertex, each
-gives it the N-th part. Friction (one_pass.py) acts against the sliding velocity of v*.
+gives it the N-th part. Where some bodies take implicit steps W is a bound (rows.py), and one that
+is alone closes in part too, over several steps. Friction (one_pass.py) acts against the sliding
+velocity of v*.
 """
 
 import warp as wp
 
-from warp_contact.kernels.impulse.constraint import Constraint, Impulse
-from warp_contact.kernels.impulse.impulse import part_of
-from warp_contact.kernels.impulse.one_pass import with_friction
+from warp_contact.kernels.impulse.constraint import Constraint, Impulse, coefficient
+from warp_contact.kernels.impulse.one_pass import give, with_friction
 from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
 
@@ -27,7 +28,7 @@ wp.set_module_options(OPTIONS)
 def predicted_impulses(
     # in
     threads: int,
-    mu: float,
+    friction: wp.array[float],  # (n_body + n_plane,) Coulomb coefficients
     dt: wp.array[float],  # (n_vert,) [s]
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
@@ -46,7 +47,7 @@ def predicted_impulses(
         if to.inv_mass > 0.0:
             g = gap(at, x)
             p = wp.max(-g, 0.0) / (dt[at.vert[0]] * to.inv_mass)
+        mu = coefficient(at.pair, friction)
         given = with_friction(p, at.normal, relative_velocity(at, v), mu, to)
-        for k in range(5):
-            part[5 * c + k] = part_of(k, at, to, given.normal * at.normal + given.friction)
         impulse[c] = given
+        give(c, given, at, to, part)

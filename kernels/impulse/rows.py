@@ -10,7 +10,7 @@ inequality. Only contacts that may move count, those with an impulse or an appro
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import RIGID, Implicit, moves
+from warp_contact.kernels.implicit.bodies import FOUR, RIGID, Implicit, block_of, moves
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
 from warp_contact.kernels.options import OPTIONS
@@ -64,31 +64,62 @@ def share_of(
 
 
 @wp.func
-def row_sum(
+def first_of_four(i: int, graph: ContactGraph, d: Implicit) -> int:
+    """First of the four vertices of vertex i, if none of them before i has contacts; else -1."""
+    first = i - (i - d.body_vert[d.vert_body[i]]) % FOUR
+    for j in range(first, i):
+        if graph.start[j] < graph.start[j + 1]:
+            return -1
+    return first
+
+
+@wp.func
+def rigid_row_sum(
     i: int, share: wp.array[float], touched: Touched, x: wp.array[wp.vec3], d: Implicit
 ) -> float:
-    """Row sum t of vertex i [1/kg]."""
+    """Row sum t of vertex i of a rigid body [1/kg]."""
     b = d.vert_body[i]
-    if d.inv_mass[i] == 0.0:
-        return 0.0
-    if not moves(b, d):
-        return d.inv_mass[i] * share[i]
     first = d.body_vert[b]
-    at = d.first[b] + (i - first) * (d.body_vert[b + 1] - first) - first
     s = float(0.0)
-    if d.kind[b] == RIGID:
-        arm = float(0.0)
-        for k in range(touched.n[b]):
-            j = touched.vert[first + k]
-            s += share[j]
-            arm += share[j] * wp.length(x[j] - d.centre[b])
-        c = d.inv_inertia[b]  # its norm is at most that of Frobenius
-        own = wp.length(x[i] - d.centre[b])
-        return ROOM * (d.inv_total[b] * s + wp.sqrt(wp.ddot(c, c)) * own * arm)
+    arm = float(0.0)
     for k in range(touched.n[b]):
         j = touched.vert[first + k]
-        s += d.norm[at + j] * share[j]
-    return ROOM * s
+        s += share[j]
+        arm += share[j] * wp.length(x[j] - d.centre[b])
+    c = d.inv_inertia[b]  # its norm is at most that of Frobenius
+    own = wp.length(x[i] - d.centre[b])
+    return ROOM * (d.inv_total[b] * s + wp.sqrt(wp.ddot(c, c)) * own * arm)
+
+
+@wp.func
+def set_row_sums(
+    four: int,
+    graph: ContactGraph,
+    share: wp.array[float],
+    touched: Touched,
+    x: wp.array[wp.vec3],
+    d: Implicit,
+    row: wp.array[float],
+):
+    """Set the row sums t of those of four vertices that have contacts [1/kg]."""
+    b = d.vert_body[four]
+    first = d.body_vert[b]
+    dense = moves(b, d) and d.kind[b] != RIGID
+    sums = wp.vec4()
+    if dense:
+        at = block_of(four, d) - first
+        for k in range(touched.n[b]):
+            j = touched.vert[first + k]
+            sums += share[j] * d.norm[at + j]
+    for k in range(FOUR):
+        i = four + k
+        if i < d.body_vert[b + 1] and graph.start[i] < graph.start[i + 1]:
+            if dense or d.inv_mass[i] == 0.0:
+                row[i] = ROOM * sums[k]
+            elif d.kind[b] == RIGID and d.awake[b] != 0:
+                row[i] = rigid_row_sum(i, share, touched, x, d)
+            else:
+                row[i] = d.inv_mass[i] * share[i]
 
 
 @wp.kernel
@@ -136,10 +167,11 @@ def find_rows(
     # out
     row: wp.array[float],  # (n_vert,) t_i
 ):
-    """For each vertex with contacts: its row sum."""
+    """For each vertex with contacts, four at once: its row sum."""
     for k in range(wp.tid(), graph.n_touched[0], threads):
-        i = graph.touched[k]
-        row[i] = row_sum(i, share, touched, x, d)
+        four = first_of_four(graph.touched[k], graph, d)
+        if four >= 0:
+            set_row_sums(four, graph, share, touched, x, d, row)
 
 
 @wp.func

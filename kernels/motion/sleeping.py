@@ -143,7 +143,7 @@ def clear_pairs(
     awake: wp.array[int],  # (n_body,)
     # in, out
     key: wp.array[wp.int64],  # (n_pair,) of pair_impulses.py
-    total: wp.array2d[wp.int64],  # (n_pair, 3)
+    total: wp.array2d[wp.int64],  # (n_pair, COLUMNS) of pair_impulses.py
 ):
     """One thread per slot: forget pairs with a body awake; the others keep their last force."""
     k = wp.tid()
@@ -156,5 +156,5 @@ def clear_pairs(
         stays = False
     if not stays:
         key[k] = wp.int64(-1)
-        for j in range(3):
+        for j in range(total.shape[1]):
             total[k, j] = wp.int64(0)

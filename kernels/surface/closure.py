@@ -26,7 +26,7 @@ from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, REST_GAP
 from warp_contact.kernels.mobility import Mobility, mobility_of
 from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.worlds import DONE, Worlds
+from warp_contact.kernels.worlds import DONE, Worlds, ask
 
 wp.set_module_options(OPTIONS)
 
@@ -94,8 +94,8 @@ def solve_gaps(
         w = constraint[c].inv_mass
         if w > 0.0:
             g = gap(at, x) + slack[c]
-            if g < -CLOSURE_TOLERANCE * at.edge_length and worlds.sweep[0] < PASSES:
-                worlds.asking[world] = 1
+            if g < -CLOSURE_TOLERANCE * at.edge_length:
+                ask(worlds, world, PASSES, True)
             p = wp.max(push[c] - g / w, 0.0)
         for k in range(5):
             part[5 * c + k] = at.coef[k] * (p - push[c]) * at.normal

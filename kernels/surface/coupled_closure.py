@@ -14,7 +14,7 @@ from warp_contact.kernels.impulse.rows import row_weight
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
 from warp_contact.kernels.narrow_phase.contact import Contact, gap
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.worlds import DONE, LAST, Worlds
+from warp_contact.kernels.worlds import DONE, LAST, Worlds, ask
 
 wp.set_module_options(OPTIONS)
 
@@ -70,8 +70,8 @@ def solve_gaps(
             continue
         last = worlds.doing[world] == LAST
         g = gap(at, x) + slack[c]
-        if g < -CLOSURE_TOLERANCE * at.edge_length and sweep < passes:
-            worlds.asking[world] = 1
+        if g < -CLOSURE_TOLERANCE * at.edge_length:
+            ask(worlds, world, passes, True)
         if counted[c] == 0 and g >= 0.0:
             continue
         for k in range(5):

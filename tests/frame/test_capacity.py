@@ -207,3 +207,17 @@ def test_buffers_that_were_too_small_leave_no_trace(speed):
     for roomy, tight in zip(*found, strict=True):
         assert all(np.array_equal(one, other) for one, other in zip(roomy, tight, strict=True))
     assert sim._stepper.work.capacity.contacts > 4
+
+
+def test_a_frame_that_goes_back_finds_its_pairs_anew(device):
+    scene = Scene(gravity=(0.0, 0.0, 0.0))
+    for k in range(2):
+        scene.add_body(box(0.1, 2), RUBBER, (0.0, 0.0, 0.1001 * k))
+    sim = Simulation(scene, device=str(device))
+    sim.step_frame()
+    pairs = sim._stepper.work.broad_phase.verts.n
+    assert pairs.numpy()[0] > 0
+    pairs.zero_()  # as where they did not fit
+    sim._stepper._start.go_back(sim.state, sim._stepper.work)
+    sim.step_frame()
+    assert pairs.numpy()[0] > 0

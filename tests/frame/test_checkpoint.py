@@ -12,12 +12,14 @@ from warp_contact import (
     Scene,
     Simulation,
     TetMesh,
+    VirtualSurface,
     box,
     sphere,
 )
 
 RUBBER = NeoHookean(3e4, 0.3, 1000.0, 2e-3)
 RESPONSES = ContactSurface(), ContactSurface("literal"), Penalty(500.0), PredictedForce()
+RESPONSES += (VirtualSurface(500.0),)
 
 
 def falling(rng, mass: float = 1.0) -> Scene:

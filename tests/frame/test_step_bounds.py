@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from warp_contact import NeoHookean, Penalty, Scene, Simulation, SimulationError, box
+from warp_contact import (
+    NeoHookean,
+    Penalty,
+    Scene,
+    Simulation,
+    SimulationError,
+    VirtualSurface,
+    box,
+)
 from warp_contact.frame import step_bounds
 from warp_contact.frame.damping import RATE_MARGIN
 
@@ -116,16 +124,18 @@ def test_a_body_that_begins_to_fall_makes_no_step_longer_than_others():
     assert way <= 0.25 * 2.0 * 0.1**3 / (6.0 * 0.1**2)
 
 
-def test_a_penalty_is_stable_on_the_lightest_vertex():
+@pytest.mark.parametrize("response", [Penalty(500.0), VirtualSurface(1000.0)])
+def test_a_penalty_is_stable_on_the_lightest_vertex(response):
     """Of a light block, which presses on a heavy one."""
     scene = Scene(gravity=(0.0, 0.0, 0.0))
     for density, z in ((1e4, 0.0), (10.0, 0.1 - 0.002)):
         scene.add_body(box(0.1, 2), NeoHookean(1e3, 0.3, density), (0.0, 0.0, z))
-    sim = Simulation(scene, Penalty(500.0))
+    sim = Simulation(scene, response)
     sim.step_frame()
     light = sim.model.mass.numpy()[27:].min()
     # Of masses that penalties join in a row, the fastest mode has 2 sqrt(k / m).
     assert 2.0 * math.sqrt(500.0 / light) / (sim.fps * sim.substeps) < 2.0
+    assert response.steepness == 500.0
 
 
 def test_bodies_of_other_worlds_are_not_fast_against_each_other():

@@ -148,3 +148,14 @@ def test_a_rigid_body_is_not_given_another_shape():
     scene.add_body(wc.box(0.1, 2), RIGID, fixed=True)
     with pytest.raises(ValueError, match="it is fixed"):
         wc.Simulation(scene).apply(0, force=(1.0, 0.0, 0.0))
+
+
+def test_a_fixed_rigid_body_needs_no_implicit_steps():
+    scene = wc.Scene()
+    scene.add_body(wc.box(0.1, 2), RIGID, fixed=True)
+    scene.add_body(wc.box(0.05, 2), wc.NeoHookean(1e5, 0.3, 1000.0), (0.0, 0.0, 0.0751))
+    sim = wc.Simulation(scene)
+    assert "explicit" in sim.summary()
+    for _ in sim.frames(10):
+        pass
+    assert sim.measure().overlap < 1e-5

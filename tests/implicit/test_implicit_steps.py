@@ -148,9 +148,7 @@ def one_block(**settings):
 @pytest.mark.parametrize(
     ("settings", "reason"),
     [
-        ({"response": wc.Penalty(1e3)}, "only the balanced contact surface"),
-        ({"response": wc.PredictedForce()}, "only the balanced contact surface"),
-        ({"response": wc.ContactSurface(search="literal")}, "only the balanced contact surface"),
+        ({"response": wc.ContactSurface(search="literal")}, "the literal search moves vertex by"),
     ],
 )
 def test_what_takes_no_implicit_steps_is_refused_with_its_reason(settings, reason):

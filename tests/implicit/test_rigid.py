@@ -4,17 +4,32 @@ import numpy as np
 import pytest
 
 import warp_contact as wc
+from warp_contact.scene.scene import rotation_matrix
 
 G = 9.81
 
 
-def on_a_slope(degrees: float, mesh, friction: float, frames: int):
+SOLID = wc.Rigid(1000.0)
+DIE = wc.box((0.1, 0.06, 0.03), 2)
+
+
+def loaded(mesh, shift, rotation=(0.0, 0.0, 0.0, 1.0)) -> wc.Rigid:
+    """The solid of a mesh, with its mass moved and turned in it."""
+    solid, turn = SOLID.solid(mesh.vertices, mesh.tets), rotation_matrix(rotation)
+    inertia = turn @ solid.inertia @ turn.T
+    return wc.Rigid(mass=solid.mass, centre=solid.centre + shift, inertia=inertia)
+
+
+LOADED = loaded(DIE, (0.01, -0.02, 0.005), (0.4, -0.3, 0.2, 0.8))
+
+
+def on_a_slope(degrees: float, mesh, friction: float, frames: int, material=SOLID):
     """Simulation and path along x of a rigid body that starts at rest on a slope."""
     angle = np.radians(degrees)
     scene = wc.Scene(gravity=(G * np.sin(angle), 0.0, -G * np.cos(angle)), friction=friction)
     scene.add_plane((0.0, 0.0, 1.0), 0.0)
     height = -mesh.vertices[:, 2].min() + 1e-5
-    scene.add_body(mesh, wc.Rigid(1000.0), (0.0, 0.0, height))
+    scene.add_body(mesh, material, (0.0, 0.0, height))
     sim = wc.Simulation(scene)
     start = sim.pose(0)[0][0]
     return sim, np.array([sim.pose(0)[0][0] - start for _ in sim.frames(frames)])
@@ -33,19 +48,24 @@ def test_it_stays_where_friction_holds_it():
     assert np.abs(path).max() < 5e-5  # it falls by 1e-5 m first
 
 
-@pytest.mark.parametrize(("degrees", "falls"), [(24.0, False), (29.0, True)])
-def test_it_topples_where_its_weight_leaves_its_base(degrees, falls):
-    sim, _ = on_a_slope(degrees, wc.box((0.05, 0.05, 0.1), 2), 1.5, 90)  # limit: atan 1/2 = 26.6
+@pytest.mark.parametrize(
+    ("degrees", "height", "falls"),
+    [(24.0, 0.05, False), (29.0, 0.05, True), (29.0, 0.03, False), (24.0, 0.07, True)],
+)
+def test_it_topples_where_its_weight_leaves_its_base(degrees, height, falls):
+    box = wc.box((0.05, 0.05, 0.1), 2)  # limits: atan 1/2 = 26.6, 39.8 and 19.7 degrees
+    material = SOLID if height == 0.05 else loaded(box, (0.0, 0.0, height - 0.05))
+    sim, _ = on_a_slope(degrees, box, 1.5, 90, material)
     turned = 2.0 * np.arccos(min(1.0, sim.pose(0)[1][3]))
     assert (turned > 0.5) == falls
     assert falls or turned < 1e-3
 
 
-def test_a_ball_rolls_down_a_slope():
+@pytest.mark.parametrize("ratio", [2 / 5, 2 / 3])
+def test_a_ball_and_a_shell_roll_down_a_slope(ratio):
     ball, angle = wc.sphere(0.05, 3000), np.radians(25.0)
-    sim, path = on_a_slope(25.0, ball, 0.9, 20)
-    m, x = sim.model.mass.numpy().astype(float), ball.vertices
-    ratio = (m * (x[:, 0] ** 2 + x[:, 2] ** 2)).sum() / (m.sum() * 0.05**2)  # 0.402, not 2 / 5
+    shell = wc.Rigid(mass=0.3, centre=(0, 0, 0), inertia=ratio * 0.3 * 0.05**2 * np.eye(3))
+    sim, path = on_a_slope(25.0, ball, 0.9, 20, SOLID if ratio < 0.5 else shell)
     t = np.arange(1, 21) / 60
     reached = path / (0.5 * G * np.sin(angle) / (1.0 + ratio) * t * t)
     # It is no ball: each of its facets takes energy, more the faster it rolls over them.
@@ -53,16 +73,17 @@ def test_a_ball_rolls_down_a_slope():
     assert loss < 0.0 and reached[-1] > 0.9 and abs(slow - 1.0) < 0.03
     v = sim.velocities(0)
     spin = np.linalg.norm(v - v.mean(axis=0), axis=1).max()
-    assert abs(spin / np.linalg.norm(v.mean(axis=0)) - 1.0) < 0.03  # it does not slide
+    assert abs(spin / np.linalg.norm(v.mean(axis=0)) - 1.0) < 0.05  # it does not slide
 
 
 def euler(inertia: np.ndarray, w: np.ndarray, t: float, steps: int) -> np.ndarray:
-    """Rotation after the time t of a free body with main moments ``inertia`` and spin w."""
+    """Rotation after the time t of a free body with spin w, both in its frame."""
 
     def rate(y):
         spin, turn = y[:3], y[3:].reshape(3, 3)
         k = np.cross(np.eye(3), spin)  # columns w x e
-        return np.concatenate([np.cross(inertia * spin, spin) / inertia, (turn @ -k.T).ravel()])
+        faster = np.linalg.solve(inertia, np.cross(inertia @ spin, spin))
+        return np.concatenate([faster, (turn @ -k.T).ravel()])
 
     y, h = np.concatenate([w, np.eye(3).ravel()]), t / steps
     for _ in range(steps):  # Runge-Kutta of fourth order
@@ -73,39 +94,45 @@ def euler(inertia: np.ndarray, w: np.ndarray, t: float, steps: int) -> np.ndarra
     return y[3:].reshape(3, 3)
 
 
-def spinning(substeps: int, w):
+def spinning(substeps: int, w, material=SOLID, **where):
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
-    scene.add_body(wc.box((0.1, 0.06, 0.03), 2), wc.Rigid(1000.0), angular_velocity=w)
+    scene.add_body(DIE, material, angular_velocity=w, **where)
     return wc.Simulation(scene, substeps=substeps)
 
 
-def test_it_turns_over_as_the_equations_of_euler_say():
-    w = np.array([0.1, 12.0, 0.1])  # about the middle axis, which is unstable (Dzhanibekov)
-    off = []
+@pytest.mark.parametrize("material", [SOLID, LOADED])
+def test_it_turns_over_as_the_equations_of_euler_say(material):
+    solid = material.solid(DIE.vertices, DIE.tets)
+    axes = np.linalg.eigh(solid.inertia)[1]
+    w = axes @ [0.1, 12.0, 0.1]  # about the middle axis, which is unstable (Dzhanibekov)
+    v, off = np.array([0.1, 0.0, -0.05]), []
     for substeps in (8, 32):
-        sim = spinning(substeps, w)
-        x, m = sim.positions().astype(float), sim.model.mass.numpy().astype(float)
-        inertia = (m[:, None] * (np.square(x).sum(axis=1)[:, None] - x * x)).sum(axis=0)
+        sim = spinning(substeps, w, material, velocity=v)
         for _ in sim.frames(90):
             pass
-        turn = euler(inertia, w, 1.5, 6000)
-        off.append(np.abs(sim.positions() - x @ turn.T).max() / 0.05)
+        turn = euler(solid.inertia, w, 1.5, 6000)
+        x = solid.centre + 1.5 * v + (DIE.vertices - solid.centre) @ turn.T
+        off.append(np.abs(sim.positions() - x).max() / 0.05)
     # It has turned over: on its way the unstable axis magnifies steps and rounding.
-    assert (turn @ [0.0, 1.0, 0.0])[1] < 0.9
+    assert axes[:, 1] @ turn @ axes[:, 1] < 0.9
     assert max(off) < 5e-3
 
 
-def test_free_spin_keeps_momentum_energy_and_shape():
-    sim = spinning(4, np.array([1.0, 12.0, 3.0]))
+@pytest.mark.parametrize("material", [SOLID, LOADED])
+def test_free_spin_keeps_momentum_energy_and_shape(material):
+    sim = spinning(4, np.array([1.0, 12.0, 3.0]), material, velocity=(0.01, -0.005, 0.002))
     start, x = sim.measure(), sim.positions().astype(float)
     for _ in sim.frames(240):
         pass
     now, y = sim.measure(), sim.positions().astype(float)
     away = np.abs(now.angular_momentum - start.angular_momentum).max()
+    # A walk of 960 steps, each of which rounds by 1e-7 and less.
     assert away < 2e-6 * np.abs(start.angular_momentum).max()
+    fastest = np.abs(sim.velocities()).max() * sim.model.mass.numpy().sum()
+    assert np.abs(now.momentum - start.momentum).max() < 1e-6 * fastest
     assert abs(now.kinetic / start.kinetic - 1.0) < 2e-3
     lengths = [np.linalg.norm(z[:, None] - z, axis=2) for z in (x, y)]
-    assert np.abs(lengths[1] - lengths[0]).max() < 1e-7  # float32 positions of 0.05 m
+    assert np.abs(lengths[1] - lengths[0]).max() < 1e-7  # float32 positions of 0.1 m
 
 
 def test_a_very_stiff_body_moves_as_a_rigid_one():
@@ -119,7 +146,11 @@ def test_a_very_stiff_body_moves_as_a_rigid_one():
         sim = wc.Simulation(scene, integrator="implicit", substeps=8)
         return np.array([sim.positions().mean(axis=0) for _ in sim.frames(60)])
 
-    rigid, stiff = dropped(wc.Rigid(1000.0)), dropped(wc.NeoHookean(1e12, 0.3, 1000.0))
+    # A soft body has its mass at its vertices, and with it the moments of a larger box.
+    m = np.bincount(wc.box(0.1, 2).tets.ravel(), np.repeat(250.0 * wc.box(0.1, 2).volumes, 4))
+    moment = (m * np.square(wc.box(0.1, 2).vertices[:, :2]).sum(axis=1)).sum()
+    rigid = dropped(wc.Rigid(mass=1.0, centre=(0, 0, 0), inertia=moment * np.eye(3)))
+    stiff = dropped(wc.NeoHookean(1e12, 0.3, 1000.0))
     assert np.abs(rigid - stiff).max() < 1e-2 * 0.1
 
 
@@ -169,7 +200,7 @@ def test_forces_and_torques_act_for_a_frame():
     sim = wc.Simulation(scene)
     mass = float(sim.model.mass.numpy()[:27].sum())
     x = sim.positions("a").astype(float)
-    moment = (sim.model.mass.numpy()[:27] * (x[:, 0] ** 2 + x[:, 1] ** 2)).sum()
+    moment = mass * 0.1**2 / 6.0
     pushes = [0.3, -0.1, 0.5, 0.2]
     for push in pushes:
         sim.apply("a", (push, 0.0, 0.0), at=(0.0, 0.02, 0.0))
@@ -227,24 +258,13 @@ def test_what_a_rigid_body_cannot_do_is_refused_by_name():
     scene = wc.Scene()
     scene.add_body(box, rigid, label="tool")
     with pytest.raises(ValueError, match="'tool' is rigid"):
-        wc.Simulation(scene, wc.Penalty(1e3))
+        wc.Simulation(scene, wc.ContactSurface("literal"))
     with pytest.raises(ValueError, match="density"):
         wc.Rigid(-1.0)
     explicit = wc.Scene()
     explicit.add_body(box, wc.NeoHookean(1e5, 0.3, 1000.0), label="foam")
     with pytest.raises(ValueError, match=r"'foam'.*implicit"):
         wc.Simulation(explicit).apply("foam", (1.0, 0.0, 0.0))
-
-
-def test_a_fixed_rigid_body_needs_no_implicit_steps():
-    scene = wc.Scene()
-    scene.add_body(wc.box(0.1, 2), wc.Rigid(1000.0), fixed=True)
-    scene.add_body(wc.box(0.05, 2), wc.NeoHookean(1e5, 0.3, 1000.0), (0.0, 0.0, 0.0751))
-    sim = wc.Simulation(scene)
-    assert "explicit" in sim.summary()
-    for _ in sim.frames(10):
-        pass
-    assert sim.measure().overlap < 1e-5
 
 
 def test_what_rests_sleeps_until_something_comes_and_stays_where_it_was(tmp_path):

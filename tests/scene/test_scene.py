@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warp_contact import ContactSurface, NeoHookean, Penalty, Scene, Simulation, box
+from warp_contact import ContactSurface, NeoHookean, Penalty, Scene, Simulation, VirtualSurface, box
 from warp_contact.scene.scene import rotation_matrix
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -100,6 +100,8 @@ def test_a_plane_is_normalised_but_its_offset_is_a_length():
         (ContactSurface, {"iterations": 0}),
         (Penalty, {"stiffness": 0.0}),
         (Penalty, {"stiffness": 1.0, "damping": -1.0}),
+        (VirtualSurface, {"stiffness": -1.0}),
+        (VirtualSurface, {"stiffness": 1.0, "damping": np.nan}),
     ],
 )
 def test_a_response_without_sense_is_refused(response, options):

@@ -12,6 +12,7 @@ from warp_contact import (
     Rigid,
     Scene,
     Simulation,
+    VirtualSurface,
     box,
 )
 from warp_contact.frame import buffers
@@ -20,6 +21,7 @@ RESPONSES = {
     "surface": ContactSurface(),
     "literal": ContactSurface("literal"),
     "penalty": Penalty(1000.0, 0.5),
+    "virtual": VirtualSurface(2000.0, 0.5),
     "predicted": PredictedForce(),
 }
 FORBIDDEN = [
@@ -50,7 +52,9 @@ def touching(overlap: float, upper=None) -> Scene:
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.03])
-@pytest.mark.parametrize("name", [*RESPONSES, "implicit", "rigid"])
+@pytest.mark.parametrize(
+    "name", [*RESPONSES, "implicit", "rigid", "rigid penalty", "rigid predicted"]
+)
 def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap):
     captured = []
     take_steps = buffers.take_steps
@@ -69,8 +73,8 @@ def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap
         captured.append(args)
 
     monkeypatch.setattr(buffers, "take_steps", guarded)
-    scene = touching(overlap, Rigid(1000.0) if name == "rigid" else None)
+    scene = touching(overlap, Rigid(1000.0) if name.startswith("rigid") else None)
     integrator = "explicit" if name in RESPONSES else "implicit"
-    sim = Simulation(scene, RESPONSES.get(name), integrator=integrator)
+    sim = Simulation(scene, RESPONSES.get(name.removeprefix("rigid ")), integrator=integrator)
     assert any(sim.contact_fields()["pressure"].any() for _ in sim.frames(2))
     assert captured and np.isfinite(sim.positions()).all()

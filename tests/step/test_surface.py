@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, box
-from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
+from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, OLD_OVERLAP
 from warp_contact.kernels.surface.closure import PASSES
 from warp_contact.step import residual, search, surface
 
@@ -36,7 +36,7 @@ def closed(scene: Scene, stages, find_contacts, records) -> tuple:
     find_contacts(model, work, state.x)
     x0, v0 = state.x.numpy().astype(float), state.v.numpy().astype(float)
     residual.find_gaps(model, state.x, work)
-    surface.close_all(model, state, work)
+    surface.close(model, state, work)
     x1, v1 = state.x.numpy().astype(float), state.v.numpy().astype(float)
     return model, (x0, x1), (v0, v1), records(work)
 
@@ -146,7 +146,7 @@ def test_an_overlap_of_before_the_step_is_left_to_the_search(stages, find_contac
     residual.find_gaps(model, state.x, work)
     search.balance(model, state.x, work, ITERATIONS)
     found = state.x.numpy().copy()
-    surface.close(model, state, work)
+    surface.close(model, state, work, before=OLD_OVERLAP)
     # The closure has nothing to add to what was found.
     np.testing.assert_array_equal(state.x.numpy(), found)
     moves = found[:, 2] - x0[:, 2]
@@ -163,6 +163,17 @@ def test_an_overlap_of_before_the_step_is_left_to_the_search(stages, find_contac
         assert np.abs(moves).max() <= search.SEARCH_BOUND * model.body_edge.numpy().max() * (
             1.0 + 1e-3
         )
+
+
+def test_where_bodies_were_apart_no_overlap_is_old(rng, stages, find_contacts, jittered):
+    scene = stacked(rng, jittered, overlap=0.015 * EDGE)
+    model, state, work = stages(scene, dt=DT)
+    for apart in (True, False):
+        found = find_contacts(model, work, state.x).gap_bound
+        work.worlds.apart.fill_(int(apart))
+        assert (-found * DT > OLD_OVERLAP * EDGE).any()
+        residual.find_gaps(model, state.x, work)
+        assert work.worlds.old.numpy()[0] == work.worlds.was_old.numpy()[0] == int(not apart)
 
 
 def test_a_vertex_that_left_its_triangle_is_looked_at_again(rng, stages, find_contacts, jittered):

@@ -10,6 +10,7 @@ from warp_contact import (
     PredictedForce,
     Scene,
     Simulation,
+    VirtualSurface,
     box,
     sphere,
 )
@@ -48,6 +49,7 @@ def bits(scene: Scene, response) -> list[bytes]:
         pytest.param(ContactSurface(), 0.06, id="surface inside"),
         pytest.param(ContactSurface("literal"), 0.06, id="literal inside"),
         pytest.param(Penalty(2e3, 0.5), 0.06, id="penalty inside"),
+        pytest.param(VirtualSurface(4e3, 0.5), 0.06, id="virtual inside"),
         pytest.param(PredictedForce(), 0.0, id="predicted"),
     ],
 )

@@ -27,7 +27,7 @@ def pressed(rng, stages, find_contacts):
     ahead = wp.array(state.x.numpy() + DT * state.v.numpy(), dtype=wp.vec3)
     assert find_contacts(model, work, state.x, ahead).n == 1
     impulse.exchange(model, state.v, work)
-    impulse.finish(work)
+    impulse.finish(state.x, work)
     return model, state, work
 
 

@@ -17,6 +17,7 @@ STYLES = {  # method: (colour, marker, what a newcomer is told)
     "predicted": ("#3d9a93", "h", "predicted forces"),
     "literal": ("#e8a33d", "D", "the paper's search, as written"),
     "penalty": ("#7a7a7a", "v", "penalty forces"),
+    "virtual": ("#a8925a", "<", "virtual contact surface"),
     "Newton VBD": ("#2060a8", "s", "Newton VBD"),
     "Newton XPBD": ("#5fa8d8", "^", "Newton XPBD"),
     "MuJoCo flex": ("#2f8a4a", "P", "MuJoCo flex"),

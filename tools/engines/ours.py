@@ -28,8 +28,9 @@ class Own(NamedTuple):
 
     def response(self, task: Task):
         """For a task; the damping of a penalty keeps its ratio."""
-        if self.method == "penalty":
-            return wc.Penalty(self.times * task.stiffness, self.times**0.5 * task.damping)
+        if self.times:
+            kind = wc.VirtualSurface if self.method == "virtual" else wc.Penalty
+            return kind(self.times * task.stiffness, self.times**0.5 * task.damping)
         if self.method == "predicted":
             return wc.PredictedForce()
         search = "literal" if self.method == "literal" else "balanced"
@@ -37,12 +38,13 @@ class Own(NamedTuple):
 
 
 DEFAULT, IMPLICIT = Own("default", 4), Own("implicit")
+STIFFNESSES = 0.01, 0.1, 1.0, 10.0, 100.0  # of that of the task
 ALL = [
     *(DEFAULT._replace(factor=f) for f in (1, 2, 4)),
     *(IMPLICIT._replace(steps=n) for n in (None, 2, 4, 8, 16, 32)),
     *(Own(name, factor=f) for name in ("impulses alone", "predicted") for f in (1, 2, 4)),
     *(Own("literal", n, factor=f) for n in (4, 16) for f in (1, 2, 4)),
-    *(Own("penalty", times=k, factor=f) for k in (0.01, 0.1, 1.0, 10.0, 100.0) for f in (1, 2)),
+    *(Own(name, 0, k, f) for name in ("penalty", "virtual") for k in STIFFNESSES for f in (1, 2)),
 ]
 
 

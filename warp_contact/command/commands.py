@@ -83,8 +83,8 @@ def stage_info(stage, bodies) -> int:
     print(f"bodies  {len(rows)}: {vertices} vertices, {tets} tets, {triangles} surface triangles")
     width = max(len(body.label) for body in bodies)
     for body, vertices, triangles, tets in rows:
-        fixed = "  fixed" if body.fixed else ""
-        print(f"  {body.label:{width}} {vertices:7} {tets:7} {triangles:7}{fixed}")
+        kind = "  fixed" * body.fixed + "  rigid" * body.rigid
+        print(f"  {body.label:{width}} {vertices:7} {tets:7} {triangles:7}{kind}")
     return 0
 
 

@@ -8,7 +8,14 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake
 from warp_contact.kernels.implicit.advance import Drift
-from warp_contact.kernels.implicit.bodies import HELD, RIGID, Implicit, RigidMotion
+from warp_contact.kernels.implicit.bodies import (
+    HELD,
+    RIGID,
+    Implicit,
+    RigidMotion,
+    Solids,
+    mat3x12,
+)
 from warp_contact.kernels.implicit.solve import Iteration
 from warp_contact.kernels.impulse.rows import Touched
 from warp_contact.kernels.mobility import Mobility
@@ -46,7 +53,6 @@ class ImplicitWork:
         bodies: what kernels know of them
         x: positions at which the mobilities are [m], shape (n_vert,)
         any_held: whether some of them have fixed vertices
-        any_rigid: whether some of them are rigid
         soft: the mobilities of vertices that are not of rigid bodies
         gradient: deformation gradient times volume of each tet [m^3], shape (n_tet,)
         stiff, damped: corners of K p and C p [N], shape (4 n_tet,); ``damped`` is empty without
@@ -70,7 +76,6 @@ class ImplicitWork:
     bodies: Implicit
     x: wp.array[wp.vec3]
     any_held: bool
-    any_rigid: bool
     soft: Mobility
     gradient: wp.array[wp.mat33]
     stiff: wp.array[wp.vec3]
@@ -109,7 +114,6 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
     return ImplicitWork(
         bodies=_bodies(model, shapes, awake),
         any_held=bool((shapes.kind == int(HELD)).any()),
-        any_rigid=bool((shapes.kind == int(RIGID)).any()),
         soft=_soft(model, shapes),
         gradient=wp.zeros(n_tet, dtype=wp.mat33),
         stiff=wp.zeros(4 * n_tet, dtype=wp.vec3),
@@ -122,7 +126,7 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
         of=_rigid(model.n_body),
         rest=_rigid(model.n_body),
         busy=wp.zeros(model.n_body, dtype=int),
-        drift=_drift(model.n_body),
+        drift=_drift(model.n_body, any(model.solids)),
         iteration=_iteration(model.n_body),
         running=wp.zeros(1, dtype=int),
         none=wp.zeros(0, dtype=wp.vec3),
@@ -139,18 +143,18 @@ def set_blocks(
     blocks: np.ndarray,
     norms: np.ndarray,
 ) -> bool:
-    """Set the blocks (n, 3, 3) [1/kg] of all shapes, one set for each length of the step.
+    """Set the blocks (n, 3, 12) [1/kg] of all shapes, one set for each length of the step.
 
-    ``norms`` are theirs (n,), ``h`` the step of each body [s], ``first`` where its set begins; both
-    (n_body,). Returns whether arrays had to be replaced by larger ones.
+    ``norms`` are theirs (n, 4), ``h`` the step of each body [s], ``first`` where its set begins;
+    both (n_body,). Returns whether arrays had to be replaced by larger ones.
     """
     d = work.bodies
     d.h.assign(h.astype(np.float32))
     d.first.assign(first + np.where(shapes.of_body >= 0, shapes.first[shapes.of_body], 0))
     larger = len(norms) > d.norm.shape[0]
     if larger:
-        d.block = wp.array(blocks, dtype=wp.mat33)
-        d.norm = wp.array(norms, dtype=float)
+        d.block = wp.array(blocks, dtype=mat3x12)
+        d.norm = wp.array(norms, dtype=wp.vec4)
     elif len(norms):
         d.block[: len(norms)].assign(blocks)
         d.norm[: len(norms)].assign(norms)
@@ -165,7 +169,7 @@ def _bodies(model: Model, shapes: Shapes, awake: Awake) -> Implicit:
     d.mass, d.inv_mass = model.mass, model.inv_mass
     d.first = wp.zeros(n, dtype=int)
     n_block = int(shapes.first[-1])
-    d.block, d.norm = wp.zeros(n_block, dtype=wp.mat33), wp.zeros(n_block, dtype=float)
+    d.block, d.norm = wp.zeros(n_block, dtype=mat3x12), wp.zeros(n_block, dtype=wp.vec4)
     d.placed = wp.array(shapes.placed, dtype=wp.mat33)
     d.rest = wp.array(shapes.rest, dtype=wp.vec3)
     inverse = [np.linalg.inv(i) if i.any() else i for i in shapes.inertia]
@@ -175,7 +179,32 @@ def _bodies(model: Model, shapes: Shapes, awake: Awake) -> Implicit:
     d.centre = wp.zeros(n, dtype=wp.vec3)
     d.inv_total = wp.zeros(n, dtype=float)
     d.inv_inertia = wp.zeros(n, dtype=wp.mat33)
+    d.solids = _solids(model, shapes)
     return d
+
+
+def _solids(model: Model, shapes: Shapes) -> Solids:
+    n = model.n_body if any(model.solids) else 0
+    inertia, spread, of_vertices = (np.tile(np.eye(3), (n, 1, 1)) for _ in range(3))
+    middle, start = np.zeros((n, 3)), model.body_vert.numpy()
+    for b in np.flatnonzero(shapes.kind == int(RIGID)):
+        own = slice(start[b], start[b + 1])
+        q = shapes.rest[own].astype(np.float32).astype(float)  # as kernels have it
+        m = model.mass.numpy()[own].astype(float)
+        middle[b] = np.average(q, axis=0, weights=m)
+        s = q - middle[b]
+        spread[b] = (m[:, None] * s).T @ s
+        of_vertices[b] = np.trace(spread[b]) * np.eye(3) - spread[b]
+        inertia[b] = shapes.inertia[b]
+    solids = Solids()
+    solids.inertia = wp.array(inertia, dtype=wp.mat33d)
+    solids.inverse = wp.array(np.linalg.inv(inertia), dtype=wp.mat33d)
+    solids.middle = wp.array(middle, dtype=wp.vec3d)
+    solids.spread = wp.array(np.linalg.inv(spread), dtype=wp.mat33d)
+    solids.inverse_of_vertices = wp.array(np.linalg.inv(of_vertices), dtype=wp.mat33d)
+    solids.turn = wp.zeros(n, dtype=wp.mat33d)
+    solids.at, solids.v, solids.w = (wp.zeros(n, dtype=wp.vec3d) for _ in range(3))
+    return solids
 
 
 def _rigid(n_body: int) -> RigidMotion:
@@ -184,8 +213,11 @@ def _rigid(n_body: int) -> RigidMotion:
     return motion
 
 
-def _drift(n_body: int) -> Drift:
+def _drift(n_body: int, any_rigid: bool) -> Drift:
     drift = Drift()
+    n = n_body if any_rigid else 0
+    drift.centre, drift.rate = (wp.zeros(n, dtype=wp.vec3d) for _ in range(2))
+    drift.lies = wp.zeros(n, dtype=wp.mat33d)
     drift.turn, drift.w = wp.zeros(n_body, dtype=wp.mat33), wp.zeros(n_body, dtype=wp.vec3)
     return drift
 

@@ -28,15 +28,31 @@ class Elements:
 
 
 @dataclass(frozen=True)
+class Solid:
+    """What a rigid body weighs, in the frame of its mesh.
+
+    Attributes:
+        mass: [kg]
+        centre: of mass [m], shape (3,)
+        inertia: about it [kg m^2], shape (3, 3)
+    """
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+
+
+@dataclass(frozen=True)
 class Model:
     """What does not change during a run.
 
     Attributes:
         labels: name of each body
         materials: material of each body, as given by the user
+        solids: of each body that is rigid and moves freely, None for the others
         elements: the tets, one entry for each material model in use
         gravity: acceleration [m/s^2]
-        friction: Coulomb coefficient [-]
+        friction: Coulomb coefficient of each body, then of each plane, shape (n_body + n_plane,)
         n_body: number of bodies
         n_vert: number of vertices
         n_tet: number of tets
@@ -52,7 +68,7 @@ class Model:
         body_edge: mean edge length of each body [m], shape (n_body,)
         body_thickness: twice the volume over the surface area of each body [m], shape (n_body,)
         vert_body: body of each vertex, shape (n_vert,)
-        mass: vertex masses [kg], shape (n_vert,)
+        mass: vertex masses [kg], shape (n_vert,); in a rigid body they have the right sum alone
         inv_mass: their inverses, 0 for a fixed vertex [1/kg], shape (n_vert,)
         rest: vertices of the mesh of each body, as it was given [m], NumPy, shape (n_vert, 3)
         surf: ids of the surface vertices, ascending, shape (n_surf,)
@@ -76,9 +92,10 @@ class Model:
 
     labels: tuple[str, ...]
     materials: tuple
+    solids: tuple[Solid | None, ...]
     elements: tuple[Elements, ...]
     gravity: tuple[float, float, float]
-    friction: float
+    friction: wp.array
     n_body: int
     n_vert: int
     n_tet: int

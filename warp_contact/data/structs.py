@@ -40,8 +40,8 @@ def n_world(model: Model) -> int:
     return len(np.unique(model.body_world.numpy()))
 
 
-def worlds_of(model: Model, surface: Surface, has_new: wp.array) -> Worlds:
-    """What a step knows of each world; bodies may overlap. ``has_new`` as in ``Worlds``."""
+def worlds_of(model: Model, surface: Surface, has_new: wp.array, unsolved: wp.array) -> Worlds:
+    """What a step knows of each world; bodies may overlap. Arrays given are as in ``Worlds``."""
     of_body, shortest = _shortest_edges(model)
     of_vert = of_body[model.vert_body.numpy()].astype(np.int32)
     worlds = Worlds()
@@ -52,7 +52,7 @@ def worlds_of(model: Model, surface: Surface, has_new: wp.array) -> Worlds:
     )
     worlds.sweep = wp.zeros(1, dtype=int)
     worlds.open, worlds.old, worlds.was_old = surface.open, surface.old, surface.was_old
-    worlds.has_new = has_new
+    worlds.has_new, worlds.unsolved = has_new, unsolved
     return worlds
 
 

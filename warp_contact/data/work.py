@@ -48,7 +48,7 @@ class Work:
         contacts: the contacts of the step
         sweeps: state of the sweeps over them
         surface: scratch of the search for the contact surface
-        forces: the impulses of the frame
+        forces: what contact did in the frame
         warm: the impulses of the last step
     """
 
@@ -101,6 +101,7 @@ def allocate_work(
     broad = broad_phase.allocate(model, state.x, capacity)
     narrow = narrow_phase.allocate(capacity, n_world(model))
     of_surface = surface.allocate(n_world(model), model.n_body, n, model.n_tet, m)
+    forces = contact_forces.allocate(n, capacity.pairs, n_world(model), unit)
     return Work(
         capacity=capacity,
         overflow=overflow.allocate(),
@@ -109,7 +110,7 @@ def allocate_work(
         awake=awake,
         mesh=mesh_of(model, broad.surface),
         mobility=mobility_of(model, rows=shapes is not None),
-        worlds=worlds_of(model, of_surface, narrow.has_new),
+        worlds=worlds_of(model, of_surface, narrow.has_new, forces.unsolved),
         scan=scan.allocate(
             max(2 * n + 2, model.n_edge + 1, capacity.verts + 1, capacity.edges + 1)
         ),
@@ -122,7 +123,7 @@ def allocate_work(
         contacts=contacts.allocate(n, m, narrow.n_inside),
         sweeps=sweeps.allocate(n, m),
         surface=of_surface,
-        forces=contact_forces.allocate(n, capacity.pairs, unit),
+        forces=forces,
         warm=warm_start.allocate(n, m),
     )
 

@@ -10,18 +10,20 @@ from numpy.lib.recfunctions import repack_fields
 from warp_contact.data.model import Model
 from warp_contact.files import replacing
 
-FORMAT = 7
+FORMAT = 8
 
 
 def fingerprint(model: Model, *settings) -> str:
     """Digest of all that must be the same for a run to continue with the same bits."""
-    digest = hashlib.sha256(repr((FORMAT, model.gravity, model.friction, settings)).encode())
+    digest = hashlib.sha256(repr((FORMAT, model.gravity, settings)).encode())
     arrays = [model.body_vert, model.body_world, model.tets, model.pose, model.mass, model.inv_mass]
-    arrays += [model.plane_n, model.plane_h]
+    arrays += [model.plane_n, model.plane_h, model.friction]
     for elements in model.elements:
         digest.update(elements.kernels.__name__.encode())
         arrays += [elements.tet, elements.param]
     digest.update(model.rest.tobytes())
+    for solid in filter(None, model.solids):
+        digest.update(np.array([solid.mass, *solid.centre, *solid.inertia.ravel()]).tobytes())
     for array in arrays:
         digest.update(array.numpy().tobytes())
     return digest.hexdigest()

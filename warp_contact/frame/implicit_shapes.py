@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
-from warp_contact.kernels.implicit.bodies import FREE, HELD, LUMPED, RIGID
+from warp_contact.kernels.implicit.bodies import FOUR, FREE, HELD, LUMPED, RIGID
 from warp_contact.step.forces import apply_damping, apply_stiffness
 
 KEPT = 8  # lengths of steps of which the inverses are kept
@@ -33,7 +33,7 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
         own = slice(start[b], start[b + 1])
         if fixed[own].all():
             continue
-        if model.materials[b].kernels is None:
+        if model.solids[b]:
             kind[b] = int(RIGID)
             continue
         kind[b] = int(HELD) if fixed[own].any() else int(FREE)
@@ -41,17 +41,38 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
         of_body[b] = like.setdefault(_key(model, b), len(firsts))
         if of_body[b] == len(firsts):
             firsts.append(b)
-    blocks = [(start[b + 1] - start[b]) ** 2 for b in firsts]
+    sizes = [start[b + 1] - start[b] for b in firsts]
+    blocks = [-(-n // FOUR) * n for n in sizes]
     first = np.concatenate([[0], np.cumsum(blocks)]).astype(int)
     rest, inertia = np.zeros((model.n_vert, 3)), np.zeros((model.n_body, 3, 3))
     mass = model.mass.numpy().astype(float)
     for b in np.flatnonzero(kind != int(LUMPED)):
-        own = slice(start[b], start[b + 1])
+        own, solid = slice(start[b], start[b + 1]), model.solids[b]
+        if solid:
+            rest[own], inertia[b] = model.rest[own] - solid.centre, solid.inertia
+            continue
         r = model.rest[own] - np.average(model.rest[own], axis=0, weights=mass[own])
         rest[own] = r
         inertia[b] = _inertia(mass[own], r)
     wrench = (wp.zeros(model.n_body, dtype=wp.vec3) for _ in range(2))
     return Shapes(kind, of_body, placed, first, rest, inertia, *wrench)
+
+
+def largest_mobilities(model: Model) -> np.ndarray:
+    """How all vertices of a body together answer impulses on each, at most [1/kg], (n_vert,).
+
+    The inverse masses, but for rigid bodies whose mass lies further inside than their vertices.
+    """
+    found, mass = model.inv_mass.numpy().astype(float), model.mass.numpy().astype(float)
+    start = model.body_vert.numpy()
+    for b, solid in enumerate(model.solids):
+        if solid:
+            own, of_body = slice(start[b], start[b + 1]), np.zeros((6, 6))
+            u = _rigid_motions(model.rest[own] - solid.centre)
+            of_body[:3, :3], of_body[3:, 3:] = solid.mass * np.eye(3), solid.inertia
+            of_vertices = u.T @ (np.repeat(mass[own], 3)[:, None] * u)
+            found[own] *= np.linalg.eigvals(np.linalg.solve(of_body, of_vertices)).real.max()
+    return found
 
 
 class Inverses:
@@ -74,9 +95,9 @@ class Inverses:
         self._kept: dict[float, tuple[np.ndarray, np.ndarray]] = {}
 
     def blocks(self, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Blocks (n, 3, 3) [1/kg] for steps ``h`` [s], shape after shape, and their norms (n,)."""
+        """Blocks (n, 3, 12) [1/kg] for steps ``h`` [s], shape after shape, and norms (n, 4)."""
         if h not in self._kept:
-            none = np.zeros((0, 3, 3)), np.zeros(0)  # all bodies are rigid
+            none = np.zeros((0, 3, 12)), np.zeros((0, 4))  # all bodies are rigid
             found = [none, *(_inverse(h, *shape) for shape in self._shapes)]
             blocks, norms = (np.concatenate(part) for part in zip(*found, strict=True))
             while len(self._kept) >= KEPT:
@@ -145,9 +166,9 @@ def _inverse(
     damping: np.ndarray,
     stiffness: np.ndarray,
     free: np.ndarray,
-    rigid: np.ndarray | None,
+    rigid: tuple[np.ndarray, np.ndarray] | None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Blocks of the inverse less its ``rigid`` part, shape (n^2, 3, 3), and norms of the whole.
+    """Blocks of the inverse less its ``rigid`` part, and norms of the whole, in rows of four.
 
     Both are 0 for fixed vertices.
     """
@@ -155,30 +176,45 @@ def _inverse(
     out = np.zeros_like(a)
     chosen = np.ix_(free, free)
     out[chosen] = np.linalg.inv(a[chosen])
-    norms = np.linalg.norm(_blocks(out), ord=2, axis=(1, 2))
+    norms = np.linalg.norm(_blocks(out), ord=2, axis=(2, 3))
     if rigid is not None:
-        out -= rigid
+        u, answer = rigid
+        out -= answer @ u.T
         # What rounding leaves of it in a stiff body.
-        project = np.eye(len(m)) - rigid * m
-        out = project @ out @ project.T
-    return _blocks(out), norms
+        mu = m[:, None] * u
+        out -= answer @ (mu.T @ out)
+        out -= (out @ mu) @ answer.T
+    columns = _in_fours(_blocks(out).swapaxes(2, 3))  # (four, column, axis, 4, 3)
+    return columns.reshape(-1, 3, 3 * FOUR), _in_fours(norms[:, :, None]).reshape(-1, FOUR)
 
 
 def _blocks(a: np.ndarray) -> np.ndarray:
+    """Shape (n, n, 3, 3)."""
     n = len(a) // 3
-    return a.reshape(n, 3, n, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)
+    return a.reshape(n, 3, n, 3).transpose(0, 2, 1, 3)
+
+
+def _in_fours(a: np.ndarray) -> np.ndarray:
+    """Rows of ``a``, shape (n, n, k, ...), four at once, zeros behind: (n / 4, n, k, 4, ...)."""
+    rows = np.zeros((-(-len(a) // FOUR) * FOUR, *a.shape[1:]))
+    rows[: len(a)] = a
+    return np.moveaxis(rows.reshape(-1, FOUR, *a.shape[1:]), 1, 3)
 
 
 def _inertia(mass: np.ndarray, r: np.ndarray) -> np.ndarray:
     return (mass * (r * r).sum(axis=1)).sum() * np.eye(3) - (mass[:, None] * r).T @ r
 
 
-def _rigid_part(mass: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """U M_r^-1 U^T of points ``r`` from their centre of mass, shape (3 n, 3 n)."""
-    n = len(r)
-    u = np.zeros((n, 3, 6))
+def _rigid_part(mass: np.ndarray, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """U and U M_r^-1 of points ``r`` from their centre of mass, shape (3 n, 6)."""
+    u = _rigid_motions(r)
+    return u, u @ np.linalg.inv(u.T @ (np.repeat(mass, 3)[:, None] * u))
+
+
+def _rigid_motions(r: np.ndarray) -> np.ndarray:
+    """U of points ``r``, shape (3 n, 6)."""
+    u = np.zeros((len(r), 3, 6))
     u[:, :, :3] = np.eye(3)
     for k in range(3):
         u[:, :, 3 + k] = np.cross(np.eye(3)[k], r)
-    u = u.reshape(3 * n, 6)
-    return u @ np.linalg.solve(u.T @ (np.repeat(mass, 3)[:, None] * u), u.T)
+    return u.reshape(-1, 6)

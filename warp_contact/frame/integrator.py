@@ -62,6 +62,8 @@ def choose(
         if obstacle:
             raise ValueError(f"integrator='implicit' is not possible: {obstacle}")
         return Integrator(True, "as asked for")
+    if not isinstance(response, ContactSurface):
+        obstacle = "their number follows from the response"
     if obstacle:
         return Integrator(False, obstacle)
     spectrum = Spectrum(model)
@@ -75,8 +77,7 @@ def choose(
 
 def _rigid(model: Model) -> str | None:
     """A rigid body that can move, or None."""
-    mobile = np.flatnonzero(_mobile(model))
-    return next((model.labels[b] for b in mobile if model.materials[b].kernels is None), None)
+    return next((name for name, s in zip(model.labels, model.solids, strict=True) if s), None)
 
 
 def _mobile(model: Model) -> np.ndarray:
@@ -86,8 +87,8 @@ def _mobile(model: Model) -> np.ndarray:
 
 def _obstacle(model: Model, response) -> str:
     """Why implicit steps are not possible; empty if they are."""
-    if not isinstance(response, ContactSurface) or response.search != "balanced":
-        return "only the balanced contact surface takes implicit steps"
+    if isinstance(response, ContactSurface) and response.search == "literal":
+        return "the literal search moves vertex by vertex; take another response"
     for body in np.flatnonzero(_mobile(model)):
         n = int(np.diff(model.body_vert.numpy())[body])
         if model.materials[body].kernels is not None and n > LARGEST:

@@ -6,7 +6,7 @@ from warp_contact.data.model import Model
 from warp_contact.kernels import scan, worlds
 from warp_contact.kernels.broad_phase import bounds, edges, hashing, near, pairs, skins
 from warp_contact.kernels.elastic import shape
-from warp_contact.kernels.implicit import advance, bodies, mobility, predict, solve
+from warp_contact.kernels.implicit import advance, bodies, masses, mobility, predict, solve
 from warp_contact.kernels.impulse import (
     constraint,
     coupled,
@@ -31,7 +31,7 @@ from warp_contact.kernels.surface import closure, coupled_closure, residual
 ALWAYS = (scan, worlds, bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure)
 ALWAYS += (constraint, impulse, pair_impulses, warm_start, residual)
 ALWAYS += (contact_graph, crossing, depth, persistent, vertex_contact, vertices)
-IMPLICIT = (advance, bodies, mobility, predict, solve, coupled, coupled_closure, rows)
+IMPLICIT = (advance, bodies, masses, mobility, predict, solve, coupled, coupled_closure, rows)
 
 
 def load_kernels(model: Model, device: wp.Device, implicit: bool) -> None:

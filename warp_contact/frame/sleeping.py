@@ -165,10 +165,12 @@ class Sleeping:
         state.v.zero_()
         self.awake.inv_mass.zero_()
         work.contacts.n.zero_()
+        work.forces.unsolved.zero_()
 
     def begin_frame(self, state: State, work: Work) -> None:
         """Stop sleeping bodies, and forget the contact forces of all others."""
         model, awake = self.model, self.awake
+        work.forces.unsolved.zero_()
         self._idle.assign(self._turns.idle[self._turns.worlds.of_body].astype(np.int32))
         wp.launch(
             kernels.pause_vertices,

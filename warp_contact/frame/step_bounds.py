@@ -11,7 +11,8 @@ body [m], all at the start of the frame. LINGERING replaces TRAVEL while there m
 than the step. At the end of the frame the step must still be below ``UNSTABLE`` 2 / omega, and its
 damping within ``damping.reach_for``. A frame that fails is repeated at the rates found there.
 
-Implicit steps are stable whatever omega: it is 0 unless a frame failed. They take
+Implicit steps are stable whatever omega: it is 0 unless a frame failed, or that of a penalty, whose
+forces are explicit. They take
 
     n       = 2^k or 3 2^k >= max(stable, u_b / (STRIDE t_b), RESOLVED) / fps
 
@@ -33,6 +34,7 @@ REACH = 0.25  # of the thinnest body: the largest relative motion in a step
 PATIENCE = 2.0  # times the stable number of steps: more are not taken for TRAVEL or LINGERING
 BLURRED = 1.05  # times the stable step: its uncertainty
 RESOLVED = 240.0  # implicit steps [1/s] at least: longer ones damp what a frame shows
+ONE_PASS = 1920.0  # implicit steps [1/s] at least, where contacts are looked at once a step
 STRIDE = 0.5  # as REACH, in implicit steps
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 lets some pass
 # Of the last frame's steps, at least: a step that follows a vibration pumps energy into it.
@@ -64,15 +66,16 @@ def steps_in_frame(per_second, fps: float, last):
     return np.maximum(np.maximum(1, kept), np.ceil(per_second / fps)).astype(int)
 
 
-def implicit_steps(omega, crossing, fps: float):
+def implicit_steps(omega, crossing, fps: float, rate: float = RESOLVED):
     """Whole implicit steps in a frame.
 
     Args:
-        omega: largest frequency [1/s] of a frame that failed, else 0
+        omega: largest frequency [1/s] of a frame that failed or of a penalty, else 0
         crossing: largest speed against a body, over its thickness [1/s]
         fps: frames a second
+        rate: steps [1/s] at least
     """
-    per_second = np.maximum(np.maximum(omega / (2.0 * SAFETY), crossing / STRIDE), RESOLVED)
+    per_second = np.maximum(np.maximum(omega / (2.0 * SAFETY), crossing / STRIDE), rate)
     least = np.maximum(per_second / fps, 1.0)
     power = 2.0 ** np.floor(np.log2(least))
     return np.ceil(power * np.select([least <= power, least <= 1.5 * power], [1.0, 1.5], 2.0))
@@ -81,7 +84,8 @@ def implicit_steps(omega, crossing, fps: float):
 def with_penalty(omega, stiffness: float, damping: float, inv_mass):
     """Frequency [1/s] with a penalty [N/m], [N s/m] on the lightest vertex, of ``inv_mass`` [1/kg].
 
-    Its damping is explicit: it would turn a velocity round in steps above 1 / (damping inv_mass).
+    In a rigid body that is what all vertices together move each of them by. Damping is explicit: it
+    would turn a velocity round in steps above 1 / (damping inv_mass).
     """
     vibrates = np.sqrt(omega**2 + 4.0 * stiffness * inv_mass)
     return np.maximum(vibrates, 2.0 * damping * inv_mass)

@@ -7,6 +7,7 @@ from warp_contact.data.state import State
 from warp_contact.errors import SimulationError
 from warp_contact.frame import step_bounds
 from warp_contact.frame.diagnosis import flattest_tet
+from warp_contact.frame.implicit_shapes import largest_mobilities
 from warp_contact.frame.last_frame import LastFrame
 from warp_contact.frame.worlds import Worlds
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
@@ -39,12 +40,14 @@ class StepCount:
         self._model = model
         self._implicit = implicit
         self._response = response
+        one_pass = isinstance(response, PredictedForce)
+        self._rate = step_bounds.ONE_PASS if one_pass else step_bounds.RESOLVED
         self._leaves = not isinstance(response, ContactSurface) or response.search == "literal"
         self._worlds = worlds
         self._thickness = -worlds.most(-model.body_thickness.numpy().astype(np.float64))
         self._edge = -worlds.most(-model.body_edge.numpy().astype(np.float64))
         lightest = np.zeros(worlds.n)
-        np.maximum.at(lightest, worlds.of_vert, model.inv_mass.numpy())
+        np.maximum.at(lightest, worlds.of_vert, largest_mobilities(model))
         self._largest_inv_mass = lightest
 
     def steps(
@@ -72,13 +75,15 @@ class StepCount:
         per_second = step_bounds.steps_per_second(omega, speed, *sizes, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
         if self._implicit:
-            n = step_bounds.implicit_steps(omega, self._crossing(state), self.fps).astype(int)
+            given = omega, self._crossing(state), self.fps, self._rate
+            n = step_bounds.implicit_steps(*given).astype(int)
         w = int(n.argmax())
         if n[w] > self.most:
             body = int(np.where(self._worlds.of_body == w, of_bodies, -1.0).argmax())
             cause = self._of_stiffness(state, body, omega[w])
             if self._implicit:
                 per_second = self._crossing(state) / step_bounds.STRIDE
+            if self._implicit and not isinstance(self._response, Penalty):
                 cause = f"{flattest_tet(self._model, state.x)} is crushed: a stiffer material helps"
             if per_second[w] > step_bounds.PATIENCE * omega[w]:  # the speed asks for them
                 cause = self._of_speed(state, w, speed[w])
@@ -128,7 +133,7 @@ class StepCount:
     def _with_response(self, omega: np.ndarray) -> np.ndarray:
         """The frequencies [1/s] of the elastic forces, or those of a penalty with them."""
         if isinstance(self._response, Penalty):
-            given = self._response.stiffness, self._response.damping, self._largest_inv_mass
+            given = self._response.steepness, self._response.damping, self._largest_inv_mass
             return step_bounds.with_penalty(omega, *given)
         return omega
 

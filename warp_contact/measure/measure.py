@@ -12,6 +12,7 @@ from warp_contact.kernels.lengths import UNHELD
 from warp_contact.kernels.motion import motion
 from warp_contact.kernels.output import measure as kernels
 from warp_contact.kernels.output import self_overlap as own
+from warp_contact.measure.solids import Solids
 from warp_contact.measure.trees import Trees
 from warp_contact.measure.tunnelling import Tunnelling
 from warp_contact.scene import topology
@@ -53,6 +54,8 @@ class Measure:
         tunnelled_pair: labels of the bodies of the last of these, the one that went through first
         unheld: surface vertices in another body or below a plane, by more than 0.01 of a mean edge,
             that had no contact in the last step
+        unsolved: how often the impulses or the closure of a world ran out of sweeps in the last
+            frame, while a contact still approached or overlapped by more than 1e-4 of an edge
         forces: mean contact force of the frame between two bodies, by their labels [N]
     """
 
@@ -71,6 +74,7 @@ class Measure:
     tunnelled: int
     tunnelled_pair: tuple[str, str] | None
     unheld: int
+    unsolved: int
     forces: dict[tuple[str, str], float]
 
     @property
@@ -89,7 +93,9 @@ class Meter:
     def __init__(self, model: Model):
         """Read what stays constant."""
         self.model = model
-        self.mass = model.mass.numpy().astype(np.float64)
+        self.mass = model.mass.numpy().astype(np.float64)  # 0 where a body has its own
+        self._solids = Solids(model)
+        self.mass[self._solids.vertices] = 0.0
         self.names = [*model.labels, *(f"plane{p}" for p in range(model.n_plane))]
         self._tets, self._body = model.tets.numpy(), model.vert_body.numpy()
         self._volume = model.volume.numpy()
@@ -109,17 +115,17 @@ class Meter:
         v = v.astype(np.float64)
         energy = wp.zeros(model.n_tet, dtype=float)
         energies(model, state.x, energy)
-        p = self.mass[:, None] * v
+        p, rigid, gravity = self.mass[:, None] * v, self._solids.motion(x, v), model.gravity
         ratio = topology.signed_volumes(x, self._tets) / self._volume
         self.tunnelling.follow(state.x)
         overlap, pair, unheld = self.overlap(state.x, work)
         self_overlap, folded = self.self_overlap(state.x)
         return Measure(
-            kinetic=self._kinetic(state, v, work, dt),
+            kinetic=self._kinetic(state, v, work, dt) + rigid.kinetic,
             elastic=float(energy.numpy().sum(dtype=np.float64)),
-            gravitational=float(-(self.mass @ x) @ np.array(model.gravity)),
-            momentum=p.sum(axis=0),
-            angular_momentum=np.cross(x, p).sum(axis=0),
+            gravitational=float(-(self.mass @ x + rigid.mass @ rigid.centre) @ np.array(gravity)),
+            momentum=p.sum(axis=0) + rigid.momentum,
+            angular_momentum=np.cross(x, p).sum(axis=0) + rigid.angular_momentum,
             overlap=overlap,
             overlap_pair=pair,
             self_overlap=self_overlap,
@@ -130,11 +136,12 @@ class Meter:
             tunnelled=self.tunnelling.count,
             tunnelled_pair=self.tunnelling.pair,
             unheld=unheld if duration > 0.0 else 0,
+            unsolved=int(work.forces.unsolved.numpy().sum()),
             forces=self.forces(work, duration),
         )
 
     def _kinetic(self, state: State, now: np.ndarray, work: Work, dt: np.ndarray) -> float:
-        """Kinetic energy [J], see ``Measure``; ``now`` are the velocities at that time [m/s]."""
+        """Kinetic energy [J] of all but rigid bodies, see ``Measure``; ``now`` are v [m/s] then."""
         if work.implicit:
             return float(0.5 * (self.mass @ (now * now)).sum())
         v = state.v.numpy().astype(np.float64)
@@ -166,7 +173,7 @@ class Meter:
     def forces(self, work: Work, duration: float) -> dict[tuple[str, str], float]:
         """Mean force between the bodies of each touching pair [N], in the order of the bodies."""
         key = work.forces.pair_key.numpy()
-        total = work.forces.pair_total.numpy() * work.forces.unit
+        total = work.forces.pair_total.numpy()[:, :3] * work.forces.unit
         out = {}
         for k in np.argsort(key):
             if key[k] >= 0 and duration > 0.0:

@@ -19,6 +19,7 @@ from warp_contact.usd.reader import (
     read_note,
     read_planes,
     read_view,
+    world_points,
 )
 
 DIRECTION = (0.55, -1.0, 0.5)  # from the scene toward an automatic camera
@@ -138,7 +139,7 @@ class Drawing:
     def points(self, frame: float) -> np.ndarray:
         """Positions [m] at a frame, shape (n_vert, 3); raises ValueError where there are none."""
         parts = zip(self.meshes, self.sizes, strict=True)
-        return np.concatenate([world_points(mesh, n, frame) for mesh, n in parts])
+        return np.concatenate([checked_points(mesh, n, frame) for mesh, n in parts])
 
     def colors(self, frame: float) -> np.ndarray:
         """Linear colours at a frame, shape (n_vert, 3)."""
@@ -179,15 +180,12 @@ def fans(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
     return np.stack([indices[first], indices[first + k + 1], indices[first + k + 2]], axis=1)
 
 
-def world_points(mesh: UsdGeom.Mesh, n: int, frame: float) -> np.ndarray:
+def checked_points(mesh: UsdGeom.Mesh, n: int, frame: float) -> np.ndarray:
     """The ``n`` points of a mesh in world coordinates [m], shape (n, 3)."""
-    matrix = np.asarray(mesh.ComputeLocalToWorldTransform(frame))
-    points = np.asarray(mesh.GetPointsAttr().Get(frame) or np.zeros((0, 3)), dtype=np.float32)
+    points = world_points(mesh, frame)
     where = f"{place(mesh.GetPrim())} at frame {frame:g}"
     if points.shape != (n, 3):
         raise ValueError(f"{where} has {len(points)} points, not {n}: is a file of it missing?")
-    if not (matrix == np.eye(4)).all():
-        points = (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
     if not (np.abs(points) < FAR).all():
         raise ValueError(
             f"{place(mesh.GetPrim())} has points at frame {frame:g} that are not finite"

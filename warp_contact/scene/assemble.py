@@ -3,9 +3,10 @@
 import numpy as np
 import warp as wp
 
-from warp_contact.data.model import Elements, Model
+from warp_contact.data.model import Elements, Model, Solid
 from warp_contact.data.state import State
 from warp_contact.scene import placement
+from warp_contact.scene.materials import Rigid
 from warp_contact.scene.scene import Scene
 
 
@@ -27,9 +28,10 @@ def assemble(scene: Scene) -> tuple[Model, State]:
     model = Model(
         labels=tuple(body.label for body in bodies),
         materials=tuple(body.material for body in bodies),
+        solids=tuple(_solid(body) for body in bodies),
         elements=_elements(scene, tet0),
         gravity=scene.gravity,
-        friction=scene.friction,
+        friction=_floats(_friction(scene)),
         n_body=len(bodies),
         n_vert=len(x),
         n_tet=len(tets),
@@ -43,6 +45,12 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         plane_h=_floats([h for _, h in scene.planes]),
     )
     return model, State(x=wp.array(x, dtype=wp.vec3), v=wp.array(v, dtype=wp.vec3))
+
+
+def _friction(scene: Scene) -> list[float]:
+    """Coulomb coefficient of each body, then of each plane."""
+    own = [*(body.friction for body in scene.bodies), *scene.plane_friction]
+    return [scene.friction if mu is None else mu for mu in own]
 
 
 def _first(bodies: list, part: str) -> np.ndarray:
@@ -78,7 +86,7 @@ def _of_tets(scene: Scene, x: np.ndarray, tets: np.ndarray, tet0: np.ndarray) ->
     """The tets, their rest shapes, and the masses that they give to their vertices."""
     bodies = scene.bodies
     volume = np.concatenate([body.mesh.volumes for body in bodies])
-    density = np.repeat([body.material.density for body in bodies], np.diff(tet0))
+    density = np.repeat([_density(body) for body in bodies], np.diff(tet0))
     mass = np.zeros(len(x))
     np.add.at(mass, tets.ravel(), np.repeat(density * volume / 4.0, 4))
     fixed = np.concatenate([body.fixed for body in bodies])
@@ -96,6 +104,18 @@ def _of_tets(scene: Scene, x: np.ndarray, tets: np.ndarray, tet0: np.ndarray) ->
         "vt_start": vt_start,
         "vt_corner": vt_corner,
     }
+
+
+def _solid(body) -> Solid | None:
+    if body.fixed.any() or not isinstance(body.material, Rigid):
+        return None
+    return body.material.solid(body.mesh.vertices, body.mesh.tets)
+
+
+def _density(body) -> float:
+    if body.material.density is None:
+        return body.material.mass / body.mesh.volume
+    return body.material.density
 
 
 def _of_surface(bodies: list, tris: np.ndarray, n_vert: int) -> dict:

@@ -11,19 +11,23 @@ A model is one kernel file (``kernels/elastic/<model>.py``) and one class here w
 * ``check()``: raises ValueError with a reason.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import KW_ONLY, dataclass, fields
 from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
 
 from warp_contact import checks
+from warp_contact.data.model import Solid
 from warp_contact.kernels.elastic import corotated, neo_hookean, springs
-from warp_contact.scene.topology import EDGES
+from warp_contact.scene.topology import EDGES, HUGE, signed_volumes
 
 OPPOSITE = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))  # opposite to corners 0, 1, 2, 3
 DENSITY = 1e-6, 1e9  # [kg/m^3]; masses and their inverses fit float32 in bodies of any size
 STIFFNESS = 1e-6, 1e15  # of Young's modulus [Pa]
+ROUNDED = 1e-6  # of the sum of the moments of inertia: what rounding may do to a matrix
+THINNEST = 1e-9  # of the same: the least moment
+LIGHTEST = 1e-36  # moment of inertia [kg m^2]: its inverse fits float32
 LONGEST = 100.0  # of damping [s]: with more nothing swings, and the stages of damping grow
 
 
@@ -140,27 +144,77 @@ class SpringNetwork:
 class Rigid:
     """A body that does not deform; it makes all steps of its scene implicit.
 
-    Its mass and moments of inertia are those of its vertices, each with a quarter of its tets, as
-    for the other materials: a coarse mesh has larger moments than the solid, a box of n cells along
-    an edge 1 + 2 / n^2 times, a ball of 300 vertices 1.03 times. All its velocities are a rigid
-    motion: others that are set become the one with the same momenta in the next frame. While fixed,
-    its vertices follow the velocities that they are given.
+    With a density it has mass, centre and moments of inertia of a solid that fills its mesh. Else
+    all three are given, as in ``Rigid(mass=2.0, centre=(0, 0, 0), inertia=np.diag([1, 2, 2]))``.
+    All its velocities are a rigid motion: others that are set become the nearest one in the next
+    frame. While fixed, its vertices follow the velocities that they are given.
 
     Attributes:
         density: [kg/m^3]
+        mass: [kg]
+        centre: of mass, in the frame of the mesh [m], shape (3,)
+        inertia: about the centre, in the same frame [kg m^2], shape (3, 3)
     """
 
-    density: float
+    density: float | None = None
+    _: KW_ONLY
+    mass: float | None = None
+    centre: tuple | None = None
+    inertia: tuple | None = None
     damping: ClassVar[float] = 0.0
     kernels: ClassVar[ModuleType | None] = None
 
     def __post_init__(self):
-        """As ``check``."""
+        """As ``check``; what is given is kept as numbers, which cannot be changed."""
         self.check()
+        if self.density is None:
+            object.__setattr__(self, "centre", tuple(np.array(self.centre, dtype=float).tolist()))
+            rows = np.array(self.inertia, dtype=float).tolist()
+            object.__setattr__(self, "inertia", tuple(map(tuple, rows)))
 
     def check(self) -> None:
-        """Raise ValueError if the number makes no material."""
-        checks.number(self.density, "density", *DENSITY)
+        """Raise ValueError if the numbers make no body."""
+        given = [n for n in ("mass", "centre", "inertia") if getattr(self, n) is not None]
+        if self.density is not None:
+            checks.number(self.density, "density", *DENSITY)
+            if given:
+                raise checks.refuse(given[0], getattr(self, given[0]), "it, or a density")
+            return
+        if len(given) < 3:
+            raise ValueError("a rigid body: give a density, or mass, centre and inertia")
+        checks.positive(self.mass, "mass")
+        checks.numbers(self.centre, (3,), "centre", HUGE)
+        _check_inertia(checks.numbers(self.inertia, (3, 3), "inertia"))
+
+    def solid(self, vertices: np.ndarray, tets: np.ndarray) -> Solid:
+        """What a body of a mesh weighs."""
+        if self.density is None:
+            return Solid(float(self.mass), np.array(self.centre), np.array(self.inertia))
+        volume = signed_volumes(vertices, tets)
+        origin = vertices.mean(axis=0)
+        x = (vertices - origin)[tets]
+        total, sums = volume.sum(), x.sum(axis=1)
+        centre = (volume[:, None] * sums).sum(axis=0) / (4.0 * total)
+        x, sums = x - centre, sums - 4.0 * centre
+        # Of a tet of volume V: V / 20 (sum of x x^T + (sum of x) (sum of x)^T).
+        second = np.einsum("q,qki,qkj->ij", volume, x, x) + (volume[:, None] * sums).T @ sums
+        second *= self.density / 20.0
+        inertia = np.trace(second) * np.eye(3) - second
+        return Solid(self.density * total, origin + centre, inertia)
+
+
+def _check_inertia(inertia: np.ndarray) -> None:
+    """Raise ValueError for what is no inertia of anything."""
+    total = np.abs(np.trace(inertia))
+    if np.abs(inertia - inertia.T).max() > ROUNDED * total:
+        raise checks.refuse("inertia", inertia.tolist(), "a symmetric matrix")
+    a, b, c = np.linalg.eigvalsh(inertia)
+    wanted = f"main moments above 0, here they are {a:.3g}, {b:.3g}, {c:.3g}"
+    if a <= max(THINNEST * total, LIGHTEST):
+        raise checks.refuse("inertia", inertia.tolist(), wanted)
+    if c > a + b + ROUNDED * total:
+        wanted = f"main moments of which none is above the sum of the others, not {c:.3g}"
+        raise checks.refuse("inertia", inertia.tolist(), f"{wanted} with {a:.3g} and {b:.3g}")
 
 
 def _multiplicity(tets: np.ndarray, parts: tuple) -> np.ndarray:

@@ -1,6 +1,8 @@
-"""Where a body is, as a rotation and a translation of its mesh."""
+"""Where a body is, as a rotation and a translation of its mesh, and how it moves as a whole."""
 
 import numpy as np
+
+from warp_contact.data.model import Solid
 
 
 def pose_of(x: np.ndarray, rest: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -9,10 +11,16 @@ def pose_of(x: np.ndarray, rest: np.ndarray, mass: np.ndarray) -> tuple[np.ndarr
     Nearest by the squares of distances, weighted with the ``mass`` of each vertex [kg]
     (Kabsch 1976).
     """
+    place, turn = frame_of(x, rest, mass)
+    return place, quaternion(turn)
+
+
+def frame_of(x: np.ndarray, rest: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same with the rotation as a matrix, shape (3, 3)."""
     c, c0 = (np.average(y, axis=0, weights=mass) for y in (x, rest))
     u, _, vt = np.linalg.svd((mass[:, None] * (x - c)).T @ (rest - c0))
     turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    return c - turn @ c0, quaternion(turn)
+    return c - turn @ c0, turn
 
 
 def quaternion(turn: np.ndarray) -> np.ndarray:
@@ -25,14 +33,24 @@ def quaternion(turn: np.ndarray) -> np.ndarray:
     return np.where(q[3] < 0.0, -q, q)
 
 
-def rigid_motion_of(
-    x: np.ndarray, v: np.ndarray, mass: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity [m/s] of the centre of mass and angular velocity [rad/s], each of shape (3,).
+def centre_of(x: np.ndarray, rest: np.ndarray, mass: np.ndarray, solid: Solid | None) -> np.ndarray:
+    """Centre of mass [m], shape (3,): that of the vertices, if the body is no ``solid``."""
+    if solid is None:
+        return np.average(x, axis=0, weights=mass)
+    place, turn = frame_of(x.astype(np.float64), rest, mass)
+    return place + turn @ solid.centre
 
-    Those of a rigid body at ``x`` (n, 3) with the momenta of the velocities ``v`` (n, 3).
+
+def rigid_motion_of(
+    x: np.ndarray, v: np.ndarray, mass: np.ndarray, at: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity [m/s] at the point ``at`` and angular velocity [rad/s], each of shape (3,).
+
+    Those of rigid vertices at ``x`` (n, 3) with the momenta of the velocities ``v`` (n, 3).
     """
     x, v = x.astype(np.float64), v.astype(np.float64)
-    r, mean = x - np.average(x, axis=0, weights=mass), np.average(v, axis=0, weights=mass)
+    middle, mean = (np.average(y, axis=0, weights=mass) for y in (x, v))
+    r = x - middle
     inertia = (mass * (r * r).sum(axis=1)).sum() * np.eye(3) - (mass[:, None] * r).T @ r
-    return mean, np.linalg.solve(inertia, (mass[:, None] * np.cross(r, v)).sum(axis=0))
+    w = np.linalg.solve(inertia, (mass[:, None] * np.cross(r, v)).sum(axis=0))
+    return mean + np.cross(w, at - middle), w

@@ -27,6 +27,7 @@ class Body:
         v: initial velocities [m/s], shape (n, 3)
         fixed: which vertices follow a prescribed velocity, shape (n,), bool
         world: bodies of different worlds never touch
+        friction: its Coulomb coefficient, None for that of the scene
     """
 
     index: int
@@ -37,6 +38,7 @@ class Body:
     v: np.ndarray = field(repr=False)
     fixed: np.ndarray = field(repr=False)
     world: int
+    friction: float | None = None
 
 
 class Scene:
@@ -44,9 +46,11 @@ class Scene:
 
     Attributes:
         gravity: acceleration [m/s^2]
-        friction: Coulomb coefficient of every contact [-]
+        friction: Coulomb coefficient of bodies and half-spaces without one of their own [-];
+            between two of them the mean of theirs counts
         bodies: in the order in which they were added
         planes: (outward unit normal, offset along it [m]) of each half-space
+        plane_friction: the coefficient of each half-space, None for that of the scene
     """
 
     def __init__(self, gravity=(0.0, 0.0, -9.81), friction: float = 0.3):
@@ -56,6 +60,7 @@ class Scene:
         self.bodies: list[Body] | tuple[Body, ...] = []
         self._labels: set[str] = set()
         self.planes: list[tuple[np.ndarray, float]] | tuple = []
+        self.plane_friction: list[float | None] | tuple = []
 
     def __setattr__(self, name: str, value) -> None:
         """Raises ValueError for a scene that a simulation has taken over, or a wrong value."""
@@ -70,6 +75,7 @@ class Scene:
         """Let nothing be changed or added from now on: a simulation does not see it."""
         if "_frozen" not in vars(self):
             self.bodies, self.planes = tuple(self.bodies), tuple(self.planes)
+            self.plane_friction = tuple(self.plane_friction)
             self._frozen = True
 
     def _refuse_if_frozen(self, what: str) -> None:
@@ -88,6 +94,7 @@ class Scene:
         label: str | None = None,
         world: int = 0,
         angular_velocity=(0.0, 0.0, 0.0),
+        friction: float | None = None,
     ) -> Body:
         """Place a copy of a rest shape: x = R vertices + position.
 
@@ -102,6 +109,7 @@ class Scene:
             label: name, unique in the scene and no ``plane<index>``; by default ``body<index>``
             world: bodies of different worlds never touch
             angular_velocity: about the centre of mass, on top of ``velocity`` [rad/s]
+            friction: Coulomb coefficient, in place of that of the scene
 
         Raises:
             ValueError: naming the body, for input that cannot be simulated
@@ -110,15 +118,13 @@ class Scene:
         try:
             _check_shape(mesh, material, label)
             world = checks.count(world, "world", least=0)
-            x = _placed(mesh, position, rotation)
-            v = _velocities(mesh, x, velocity, angular_velocity)
-            mask = _mask(fixed, len(x), isinstance(material, Rigid))
-            if mask.any() and np.any(angular_velocity):
-                wanted = "zero where vertices are fixed: these go straight, give them targets"
-                raise checks.refuse("angular_velocity", angular_velocity, wanted)
+            friction = _coefficient(friction)
+            x = _placed(mesh.vertices, position, rotation)
+            v = _velocities(mesh, material, x, (position, rotation), velocity, angular_velocity)
+            mask = _mask(fixed, len(x), isinstance(material, Rigid), angular_velocity)
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None
-        body = Body(len(self.bodies), label, mesh, material, x, v, mask, world)
+        body = Body(len(self.bodies), label, mesh, material, x, v, mask, world, friction)
         self.bodies.append(body)
         self._labels.add(label)
         return body
@@ -133,11 +139,14 @@ class Scene:
             raise ValueError(f"body '{label}': this is how a half-space is called")
         return label
 
-    def add_plane(self, normal, offset: float = 0.0) -> None:
-        """Keep every body in the half-space normal . x >= offset [m]."""
+    def add_plane(self, normal, offset: float = 0.0, friction: float | None = None) -> None:
+        """Keep every body in the half-space normal . x >= offset [m]; ``friction`` as of a body."""
         self._refuse_if_frozen("a plane")
         n = _unit(checks.numbers(normal, (3,), "plane normal"), "plane normal")
-        self.planes.append((n, checks.number(offset, "plane offset", -HUGE, HUGE)))
+        offset = checks.number(offset, "plane offset", -HUGE, HUGE)
+        friction = _coefficient(friction)
+        self.planes.append((n, offset))
+        self.plane_friction.append(friction)
 
 
 def rotation_matrix(quaternion) -> np.ndarray:
@@ -150,6 +159,10 @@ def rotation_matrix(quaternion) -> np.ndarray:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def _coefficient(friction) -> float | None:
+    return None if friction is None else checks.number(friction, "friction", least=0.0)
 
 
 def _unit(vector: np.ndarray, name: str) -> np.ndarray:
@@ -170,26 +183,36 @@ def _check_shape(mesh, material, label: str) -> None:
     placement.check_shape(mesh, label)
 
 
-def _placed(mesh: TetMesh, position, rotation) -> np.ndarray:
+def _placed(points: np.ndarray, position, rotation) -> np.ndarray:
     turn = rotation_matrix(rotation)
-    return mesh.vertices @ turn.T + checks.numbers(position, (3,), "position", HUGE)
+    return points @ turn.T + checks.numbers(position, (3,), "position", HUGE)
 
 
-def _velocities(mesh: TetMesh, x: np.ndarray, velocity, angular_velocity) -> np.ndarray:
-    """Velocities [m/s] of vertices at ``x``, shape (n, 3)."""
+def _velocities(
+    mesh: TetMesh, material, x: np.ndarray, place: tuple, velocity, angular_velocity
+) -> np.ndarray:
+    """Velocities [m/s] of vertices at ``x``, shape (n, 3), of a mesh at a position and rotation."""
     v = checks.vectors(velocity, len(x), "velocity", checks.FASTEST)
     w = checks.numbers(angular_velocity, (3,), "angular_velocity", HUGE)
-    mass = np.bincount(mesh.tets.ravel(), np.repeat(mesh.volumes, 4), len(x))
-    v = v + np.cross(w, x - np.average(x, axis=0, weights=mass))
+    if isinstance(material, Rigid):
+        centre = _placed(material.solid(mesh.vertices, mesh.tets).centre, *place)
+    else:
+        mass = np.bincount(mesh.tets.ravel(), np.repeat(mesh.volumes, 4), len(x))
+        centre = np.average(x, axis=0, weights=mass)
+    v = v + np.cross(w, x - centre)
     return checks.vectors(v, len(x), "velocity", checks.FASTEST)
 
 
-def _mask(fixed, n: int, rigid: bool) -> np.ndarray:
+def _mask(fixed, n: int, rigid: bool, angular_velocity) -> np.ndarray:
+    """Which of ``n`` vertices are fixed, shape (n,); raises ValueError where some may not be."""
     mask = np.zeros(n, dtype=bool)
     if isinstance(fixed, bool | np.bool_):
-        return mask | fixed
-    if fixed is not None:
+        mask |= fixed
+    elif fixed is not None:
         mask[checks.vertex_ids(fixed, n, "fixed")] = True
     if rigid and mask.any() and not mask.all():
         raise checks.refuse("fixed", fixed, "True or None for a rigid body")
+    if mask.any() and np.any(angular_velocity):
+        wanted = "zero where vertices are fixed: these go straight, give them targets"
+        raise checks.refuse("angular_velocity", angular_velocity, wanted)
     return mask

@@ -4,15 +4,17 @@ from collections.abc import Callable
 
 import warp as wp
 
+from warp_contact.data.implicit import ImplicitWork
 from warp_contact.data.launch import launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.work import Work
+from warp_contact.kernels.implicit import mobility
 from warp_contact.kernels.impulse import coupled as kernels
-from warp_contact.kernels.impulse import rows
+from warp_contact.kernels.impulse import rows, touched
 from warp_contact.kernels.impulse.impulse import Limits
 from warp_contact.kernels.surface import coupled_closure as closure
 from warp_contact.step import sweeps
-from warp_contact.step.implicit import answer, place
+from warp_contact.step.implicit import place
 
 TOLERANCE = 1e-4  # of an edge: an approach in a step that needs another sweep
 SWEEPS = 100  # at most: a heavy body on a light one needs most
@@ -76,14 +78,14 @@ def _sweep(model: Model, y: wp.array, work: Work, solve: Callable, *given) -> No
     w, c, s = work.implicit, work.contacts, work.sweeps
     solve(y, work, *given)
     launch_over(
-        kernels.respond,
+        touched.respond,
         model.n_body,
         inputs=[work.worlds, c.graph, c.record, w.counted, c.part, s.served, w.touched, w.x]
         + [w.bodies],
         outputs=[w.busy, w.by, w.y, w.share, w.impulse],
     )
     launch_over(
-        kernels.move,
+        touched.move,
         model.n_vert,
         inputs=[work.worlds, work.dt, c.graph, w.touched, w.x, w.y, w.share, w.busy, w.by]
         + [w.bodies],
@@ -121,6 +123,16 @@ def _find_rows(model: Model, work: Work) -> None:
     launch_over(rows.find_rows, model.n_vert, inputs=inputs, outputs=[work.mobility.row])
 
 
+def answer(model: Model, p: wp.array, out: wp.array, w: ImplicitWork) -> None:
+    """Set ``out`` to what impulses ``p`` at vertices with contacts change, shape (n_vert,)."""
+    d, n_body = w.bodies, model.n_body
+    inputs, outputs = [p, w.touched, w.x, d], [w.busy, w.by, w.y]
+    launch_over(touched.gather, n_body, inputs=inputs, outputs=outputs)
+    inputs = [w.y, w.touched, d, w.busy]
+    wp.launch(touched.multiply, model.n_vert, inputs=inputs, outputs=[out])
+    wp.launch(mobility.correct, n_body, inputs=[w.x, d, w.by, w.busy], outputs=[w.of, out])
+
+
 def _collect(model: Model, work: Work, moves: wp.array) -> None:
     w, c = work.implicit, work.contacts
     w.impulse.zero_()
@@ -134,7 +146,7 @@ def _record(model: Model, work: Work) -> None:
 
 
 def _add(model: Model, before: wp.array, y: wp.array, work: Work) -> None:
-    """Set ``y`` = ``before`` + G p for the impulses p."""
+    """Set ``y`` = ``before`` and what the impulses change."""
     w = work.implicit
     answer(model, w.impulse, w.answer, w)
     inputs = [before, w.impulse, w.answer, w.bodies]

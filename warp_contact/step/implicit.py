@@ -11,7 +11,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.implicit import advance as drifting
-from warp_contact.kernels.implicit import bodies, mobility, predict, solve
+from warp_contact.kernels.implicit import bodies, masses, mobility, predict, solve
 from warp_contact.step.forces import apply_damping, apply_stiffness, internal_forces
 
 
@@ -44,14 +44,12 @@ def drift(model: Model, state: State, work: Work, out: wp.array, turned: bool = 
     wp.launch(drifting.find_drift, model.n_body, inputs=inputs, outputs=[w.drift])
     inputs = [*given, w.bodies, w.of, w.drift, turned]
     wp.launch(drifting.advance, model.n_vert, inputs=inputs, outputs=[state.v, out])
-    if turned and w.any_rigid:
-        wp.launch(bodies.keep_shapes, model.n_body, inputs=[w.bodies], outputs=[out])
 
 
 def place(model: Model, x: wp.array, w: ImplicitWork) -> None:
     """Let the rigid part of the mobilities be that at ``x``."""
     wp.copy(w.x, x)
-    wp.launch(bodies.find_bodies, model.n_body, inputs=[x], outputs=[w.bodies])
+    wp.launch(masses.find_bodies, model.n_body, inputs=[x], outputs=[w.bodies])
 
 
 def find_mobility(model: Model, x: wp.array, w: ImplicitWork) -> None:
@@ -129,7 +127,8 @@ def _iterate(model: Model, x: wp.array, w: ImplicitWork) -> None:
     _multiply(model, x, w.p, w.ap, w, it.going)
     wp.launch(solve.go, n_body, inputs=[w.p, w.ap, w.bodies], outputs=[it, w.dv, w.r])
     answer(model, w.r, w.z, w, it.going)
-    wp.launch(solve.look, n_body, inputs=[w.r, w.z, w.bodies], outputs=[it, w.p, w.running])
+    outputs = [it, w.p, w.dv, w.running]
+    wp.launch(solve.look, n_body, inputs=[w.r, w.z, w.bodies], outputs=outputs)
 
 
 def _multiply(

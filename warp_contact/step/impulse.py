@@ -38,13 +38,13 @@ def solve_again(model: Model, state: State, work: Work) -> None:
     if_any(work.surface.any_open, exchange, model, state.v, work, FIRST_LOOK)
 
 
-def finish(work: Work) -> None:
-    """Keep the impulses of vertices for the next step, and add all to the forces of the frame.
+def finish(x: wp.array, work: Work) -> None:
+    """Keep the impulses of vertices for the next step; add all, at ``x``, to those of the frame.
 
     Those of edges were kept by each ``exchange``, which may be followed by another.
     """
     warm_start.keep_vertices(work)
-    add_forces(work)
+    add_forces(x, work)
 
 
 def forget(work: Work) -> None:
@@ -93,13 +93,13 @@ def apply(model: Model, v: wp.array, work: Work) -> None:
     )
 
 
-def add_forces(work: Work) -> None:
-    """Add the impulses of all contacts to their pairs of bodies."""
+def add_forces(x: wp.array, work: Work) -> None:
+    """Add the impulses of all contacts, at ``x``, to their pairs of bodies."""
     c, forces = work.contacts, work.forces
     launch_over(
         pair_impulses.add_pair_impulses,
         work.capacity.contacts,
-        inputs=[forces.unit, c.n, c.record, c.impulse],
+        inputs=[forces.unit, c.n, c.record, c.impulse, x],
         outputs=[forces.pair_key, forces.pair_total, work.overflow.pairs],
     )
 

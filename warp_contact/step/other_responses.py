@@ -9,12 +9,12 @@ from warp_contact.data.launch import if_any, launch_over
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
-from warp_contact.kernels.impulse import penalty, predicted
+from warp_contact.kernels.impulse import penalty, predicted, virtual
 from warp_contact.step import broad_phase, impulse, residual, search
 from warp_contact.step.damping import damp_alone
 from warp_contact.step.detection import detect, detect_vertices
-from warp_contact.step.motion import drift, kick, predict
-from warp_contact.step.response import Penalty
+from warp_contact.step.motion import finish, kick, predict
+from warp_contact.step.response import Penalty, VirtualSurface
 
 
 def step_literal(
@@ -29,7 +29,7 @@ def step_literal(
     residual.find_gaps(model, state.x, work)
     if_any(work.surface.any_open, search.bisect, model, state.x, work, iterations)
     if_any(work.contacts.n, impulse.exchange, model, state.v, work)
-    impulse.add_forces(work)
+    impulse.add_forces(state.x, work)
 
 
 def step_penalty(
@@ -41,14 +41,14 @@ def step_penalty(
     the damping acts alone, before all forces: the state at rest must not depend on it.
     """
     work.worlds.apart.zero_()
-    broad_phase.refresh(model, state.x, state.x, work)
-    detect(model, state.x, state.x, work)
     if damping_stages > 0:
         damp_alone(model, state, work, damping_stages)
     kick(model, state, work, work.awake)
+    broad_phase.refresh(model, state.x, state.x, work)
+    detect(model, state.x, state.x, work)
     if_any(work.contacts.n, _push, model, state, work, response)
-    impulse.add_forces(work)
-    drift(model, state, work, state.x)
+    impulse.add_forces(state.x, work)
+    finish(model, state, work)
 
 
 def step_predicted(model: Model, state: State, work: Work, damping_stages: int) -> None:
@@ -58,8 +58,8 @@ def step_predicted(model: Model, state: State, work: Work, damping_stages: int) 
     broad_phase.refresh(model, state.x, work.x, work)
     detect(model, state.x, work.x, work)
     if_any(work.contacts.n, _push_apart, model, state, work)
-    impulse.add_forces(work)
-    drift(model, state, work, state.x)
+    impulse.add_forces(state.x, work)
+    finish(model, state, work)
 
 
 def push_half_step(model: Model, now: State, work: Work, response: Penalty) -> None:
@@ -72,13 +72,12 @@ def push_half_step(model: Model, now: State, work: Work, response: Penalty) -> N
 def _push(model: Model, state: State, work: Work, response: Penalty) -> None:
     """Change ``state.v`` by the penalty forces at the depths found."""
     c = work.contacts
-    launch_over(
-        penalty.penalty_impulses,
-        work.capacity.contacts,
-        inputs=[response.stiffness, response.damping, model.friction, work.dt]
-        + [c.n, c.record, c.constraint, state.v],
-        outputs=[c.impulse, c.part],
-    )
+    spring = wp.vec2(response.stiffness, response.damping)
+    given = [work.dt, c.n, c.record, c.constraint, state.v]
+    kernel, inputs = penalty.penalty_impulses, [spring, model.friction, *given]
+    if isinstance(response, VirtualSurface):
+        kernel, inputs = virtual.virtual_impulses, [spring, *given, work.mesh, state.x]
+    launch_over(kernel, work.capacity.contacts, inputs=inputs, outputs=[c.impulse, c.part])
     impulse.apply(model, state.v, work)
 
 

@@ -46,6 +46,26 @@ class Penalty:
         checks.positive(self.stiffness, "penalty stiffness")
         checks.number(self.damping, "penalty damping", least=0.0)
 
+    @property
+    def steepness(self) -> float:
+        """The most that the force of a contact changes with its depth [N/m]."""
+        return self.stiffness
+
+
+@dataclass(frozen=True)
+class VirtualSurface(Penalty):
+    """Penalties of the distance to a surface midway between both surfaces (Keiser et al. 2004).
+
+    "Contact handling for deformable point-based objects" (VMV 2004), on triangles in place of
+    points; ``impulse/virtual.py`` has the formulas and where they differ from the paper. Where
+    faces lie flat on each other it is a ``Penalty`` of half the stiffness, else a weaker one.
+    """
+
+    @property
+    def steepness(self) -> float:
+        """As above: the virtual surface lies half the depth away from both, or less."""
+        return 0.5 * self.stiffness
+
 
 @dataclass(frozen=True)
 class PredictedForce:

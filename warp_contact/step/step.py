@@ -39,7 +39,7 @@ def in_contact(model: Model, state: State, work: Work, iterations: int) -> None:
     narrow_phase.find_edges(model, state.x, work.x, work)  # 3, 4
     impulse.add_edges(model, state, work)
     impulse.solve_again(model, state, work)  # 5
-    impulse.finish(work)
+    impulse.finish(state.x, work)
     finish(model, state, work)
     surface.close_gaps(model, state, work, iterations)  # 6, 7, 8
 

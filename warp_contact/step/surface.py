@@ -31,21 +31,6 @@ def close_gaps(model: Model, state: State, work: Work, iterations: int) -> None:
     if_any(work.surface.any_open, _close_gaps, model, state, work, iterations)
 
 
-def close(model: Model, state: State, work: Work, look: int = FIRST_LOOK) -> None:
-    """Move ``state.x`` until no contact overlaps, or as far as one call may move it.
-
-    Only in worlds where the ``look`` found an overlap. Vertices then lie in the planes of their
-    triangles, edges on what they touch. Contacts that overlapped when the step began are left out.
-    ``state.v`` changes only by the torque that keeps the angular momentum.
-    """
-    _close(model, state, work, look, OLD_OVERLAP, OLD_OVERLAP)
-
-
-def close_all(model: Model, state: State, work: Work, look: int = FIRST_LOOK) -> None:
-    """The same with all contacts."""
-    _close(model, state, work, look, math.inf, math.inf)
-
-
 def _close_gaps(model: Model, state: State, work: Work, iterations: int) -> None:
     searched = OLD_OVERLAP if on("search") else math.inf
     if iterations and on("search"):
@@ -53,14 +38,13 @@ def _close_gaps(model: Model, state: State, work: Work, iterations: int) -> None
     # Where bodies were apart, no overlap is older than the step: one that seems so has a wrong
     # plane, and the second look may find a better one.
     first = OLD_OVERLAP if on("old planes") else math.inf
-    _close(model, state, work, FIRST_LOOK, searched, first)
+    close(model, state, work, FIRST_LOOK, searched, first)
     # Vertices may now be at other triangles than before, and edges may cross that the narrow phase
     # could not see.
     if on("second look"):
         detect(model, state.x, state.x, work)
     residual.find_gaps_left(model, state.x, work)
-    rest = SECOND_LOOK, searched, math.inf
-    if_any(work.surface.any_open, _close, model, state, work, *rest)
+    if_any(work.surface.any_open, close, model, state, work, SECOND_LOOK, searched)
 
 
 def _search(model: Model, state: State, work: Work, iterations: int) -> None:
@@ -69,10 +53,20 @@ def _search(model: Model, state: State, work: Work, iterations: int) -> None:
         search.keep_spin(model, state, work)
 
 
-def _close(model: Model, state: State, work: Work, look: int, before: float, apart: float) -> None:
-    """Close all contacts but those that overlapped by more than some edges at the start.
+def close(
+    model: Model,
+    state: State,
+    work: Work,
+    look: int = FIRST_LOOK,
+    before: float = math.inf,
+    apart: float = math.inf,
+) -> None:
+    """Move ``state.x`` until no contact overlaps, or as far as one call may move it.
 
-    ``before`` in worlds where bodies may have overlapped then, ``apart`` where they were apart.
+    Only in worlds where the ``look`` found an overlap. Vertices then lie in the planes of their
+    triangles, edges on what they touch. ``state.v`` changes only by the torque that keeps the
+    angular momentum. Contacts that overlapped by more than some edges when the step began are left
+    out: ``before`` in worlds where bodies may have overlapped then, ``apart`` in the others.
     """
     if not on("closure"):
         return

@@ -19,6 +19,7 @@ TOPOLOGY = (
     "subdivisionScheme",
 )
 DEFAULT = Usd.TimeCode.Default()
+TURN_ERROR = 1e-9  # of a rotation: double precision
 EXTENT_ERROR = 1e-6  # of the largest coordinate: float32 in another order of operations
 
 
@@ -29,6 +30,8 @@ def problems(path) -> list[str]:
         stage = path if isinstance(path, Usd.Stage) else open_stage(path)
         found = metadata(stage) + misplaced(stage)
         for prim in stage.Traverse():
+            if read_note(prim, "body") is not None:
+                found += [f"{prim.GetPath()}: {line}" for line in frame_of(stage, prim)]
             if prim.IsA(UsdGeom.PointBased):
                 found += [f"{prim.GetPath()}: {line}" for line in point_based(stage, prim)]
         found += [d.commentary for d in delegate.TakeUncoalescedDiagnostics()]
@@ -88,22 +91,45 @@ def misplaced(stage: Usd.Stage) -> list[str]:
     return found
 
 
+def frame_of(stage: Usd.Stage, prim: Usd.Prim) -> list[str]:
+    """Samples of the transform of a rigid body, and whether it keeps the shape."""
+    place, n = UsdGeom.Xformable(prim), len(frame_numbers(stage))
+    ops = place.GetOrderedXformOps()
+    found = odd_samples(stage, prim)
+    if n > 1:
+        bare = [op.GetOpName() for op in ops if not op.GetTimeSamples()]
+        found += [f"{name} has no samples for {n} frames" for name in bare]
+    for frame in frame_numbers(stage) if ops else ():
+        matrix = np.array(place.GetLocalTransformation(frame))
+        turn = matrix[:3, :3]
+        off = np.abs(turn @ turn.T - np.eye(3)).max() if np.isfinite(matrix).all() else np.inf
+        if off > TURN_ERROR or np.linalg.det(turn) < 0.0:
+            found.append(f"it is not turned and moved alone at frame {frame}")
+    return found
+
+
+def odd_samples(stage: Usd.Stage, prim: Usd.Prim) -> list[str]:
+    """Attributes with samples at other times than the frames."""
+    frames = [float(frame) for frame in frame_numbers(stage)]
+    times = {a.GetName(): a.GetTimeSamples() for a in prim.GetAuthoredAttributes()}
+    odd = {name: len(at) for name, at in times.items() if at and at != frames}
+    return [f"{name} has {n} samples for {len(frames)} frames" for name, n in odd.items()]
+
+
 def point_based(stage: Usd.Stage, prim: Usd.Prim) -> list[str]:
     """Samples, points, extents, primvars and topology of a Mesh or a TetMesh."""
     frames = [float(frame) for frame in frame_numbers(stage)]
-    geometry = UsdGeom.PointBased(prim)
+    geometry, body = UsdGeom.PointBased(prim), prim.GetParent()
     sampled = [a for a in prim.GetAuthoredAttributes() if a.GetTimeSamples()]
     found = [f"{a.GetName()} is time-sampled" for a in sampled if a.GetName() in TOPOLOGY]
-    for attribute in sampled:
-        times = attribute.GetTimeSamples()
-        if times != frames:
-            line = f"{attribute.GetName()} has {len(times)} samples for {len(frames)} frames"
-            found.append(line)
-    times = geometry.GetPointsAttr().GetTimeSamples()
-    moving = prim.IsA(UsdGeom.Mesh) and read_note(prim.GetParent(), "body") is not None
-    if moving and not times and len(frames) > 1:
+    found += odd_samples(stage, prim)
+    own = geometry.GetPointsAttr().GetTimeSamples()
+    moving = prim.IsA(UsdGeom.Mesh) and read_note(body, "body") is not None
+    moving = moving and not UsdGeom.Xformable(body).GetOrderedXformOps()
+    if moving and not own and len(frames) > 1:
         found.append(f"points has no samples for {len(frames)} frames")
-    n = len(geometry.GetPointsAttr().Get(times[0] if times else DEFAULT) or ())
+    times = frames if sampled else []
+    n = len(geometry.GetPointsAttr().Get(own[0] if own else DEFAULT) or ())
     primvars = UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()
     lengths, wanted = sizes(prim, n), []
     for primvar in primvars:

@@ -6,6 +6,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd
 
 from warp_contact.usd.folder import TOPOLOGY, frame_file, frame_files, has_run
+from warp_contact.usd.motion import numbers
 from warp_contact.usd.reader import read_bodies
 
 
@@ -58,7 +59,8 @@ def check_frames(folder: Path, frames: range, lengths: dict[str, int]) -> list[d
             if times != [float(frame)]:
                 raise ValueError(f"{path} is not frame {frame}: {name} has values at {times}")
             value = layer.QueryTimeSample(name, frame)
-            if value is None or len(value) != n or not np.isfinite(np.asarray(value)).all():
+            found = np.zeros(0) if value is None else numbers(value)
+            if len(found) != n or not np.isfinite(found).all():
                 raise ValueError(f"{path} is damaged: {name} has not {n} finite values")
         notes.append(layer.customLayerData)
     return notes

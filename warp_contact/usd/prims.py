@@ -20,20 +20,30 @@ class Part:
     """A body as it is written.
 
     Attributes:
+        index: its number
         path: its prim
         ids: its surface vertices in the flat arrays, shape (n,)
         faces: triangles over ``ids``, shape (f, 3)
         verts: its first vertex and the one past its last
         fixed: whether none of its vertices moves freely
         color: linear base colour, shape (3,)
+        rest: vertices of its mesh [m], float32 (n, 3), if it is rigid: they are written once, and
+            its prim moves; None if it deforms
     """
 
+    index: int
     path: str
     ids: np.ndarray
     faces: np.ndarray
     verts: tuple[int, int]
     fixed: bool
     color: np.ndarray
+    rest: np.ndarray | None
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether it keeps its shape."""
+        return self.rest is not None
 
     @property
     def n_vert(self) -> int:
@@ -83,14 +93,17 @@ def parts(model) -> list[Part]:
     for b, label in enumerate(model.labels):
         ids, faces = np.unique(tris[tri[b] : tri[b + 1]], return_inverse=True)
         fixed = not bool(inv_mass[vert[b] : vert[b + 1]].any())
+        rigid = model.materials[b].kernels is None
         result.append(
             Part(
+                index=b,
                 path=f"/World/{prim_name(label, taken)}",
                 ids=ids,
                 faces=faces.reshape(-1, 3).astype(np.int32),
                 verts=(int(vert[b]), int(vert[b + 1])),
                 fixed=fixed,
                 color=linear(FIXED if fixed else PALETTE[b % len(PALETTE)]),
+                rest=model.rest[vert[b] : vert[b + 1]].astype(np.float32) if rigid else None,
             )
         )
     return result
@@ -118,22 +131,41 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
     stage.SetDefaultPrim(world.GetPrim())
     UsdGeom.Scope.Define(stage, "/World/Looks")
     look = contact_look(stage)
-    physics = {}
-    for b, (part, label) in enumerate(zip(parts, model.labels, strict=True)):
+    physics, local = {}, x.copy()
+    for part, label in zip(parts, model.labels, strict=True):
         xform = UsdGeom.Xform.Define(stage, part.path)
         Usd.ModelAPI(xform).SetKind(Kind.Tokens.component)
         note(xform, "label", Sdf.ValueTypeNames.String, label)
-        note(xform, "body", Sdf.ValueTypeNames.Int, b)
+        note(xform, "body", Sdf.ValueTypeNames.Int, part.index)
         note(xform, "fixed", Sdf.ValueTypeNames.Bool, part.fixed)
-        add_surface(stage, part, x, look)
+        if part.is_rigid:
+            local[slice(*part.verts)] = part.rest
+            add_frame(xform, part.fixed, model.solids[part.index])
+        add_surface(stage, part, local, look)
         if tets:
-            add_tets(stage, part, b, model, x, physics)
+            add_tets(stage, part, model, local, physics)
     taken = {Sdf.Path(part.path).name for part in parts} | {"Looks", "view"}
     for n, h in zip(model.plane_n.numpy(), model.plane_h.numpy(), strict=True):
         add_plane(stage, f"/World/{prim_name('ground', taken)}", n, float(h), x, look)
     if view is not None:
         add_camera(stage, *view)
     return layer
+
+
+def add_frame(xform: UsdGeom.Xform, fixed: bool, solid) -> None:
+    """Let the prim of a rigid body be moved; ``solid`` is what it weighs, None if it is fixed."""
+    xform.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
+    xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
+    UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim()).CreateKinematicEnabledAttr(fixed)
+    if solid:
+        weighs = UsdPhysics.MassAPI.Apply(xform.GetPrim())
+        moments, axes = np.linalg.eigh(solid.inertia)
+        axes[:, 2] *= np.linalg.det(axes)
+        turn = Gf.Matrix3d(axes.T.tolist()).ExtractRotation().GetQuat()
+        weighs.CreateMassAttr(solid.mass)
+        weighs.CreateCenterOfMassAttr(Gf.Vec3f(*solid.centre.tolist()))
+        weighs.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
+        weighs.CreatePrincipalAxesAttr(Gf.Quatf(turn))
 
 
 def note(prim, name: str, kind, value) -> None:
@@ -186,9 +218,9 @@ def add_surface(stage, part: Part, x: np.ndarray, look) -> None:
         api.CreatePrimvar(name, kind, UsdGeom.Tokens.vertex).Set(value)
 
 
-def add_tets(stage, part: Part, b: int, model, rest: np.ndarray, physics: dict) -> None:
-    """The TetMesh of a body under the names of the USD deformable proposal, as bare tokens."""
-    first, end = part.verts
+def add_tets(stage, part: Part, model, rest: np.ndarray, physics: dict) -> None:
+    """The TetMesh of a body; if it deforms under the names of the USD proposal, as bare tokens."""
+    b, (first, end) = part.index, part.verts
     tet, tri = model.body_tet.numpy(), model.body_tri.numpy()
     tets = model.tets.numpy().reshape(-1, 4)[tet[b] : tet[b + 1]] - first
     tris = model.tris.numpy().reshape(-1, 3)[tri[b] : tri[b + 1]] - first
@@ -201,8 +233,9 @@ def add_tets(stage, part: Part, b: int, model, rest: np.ndarray, physics: dict) 
     mesh.CreateSurfaceFaceVertexIndicesAttr(
         Vt.Vec3iArray.FromNumpy(np.ascontiguousarray(tris, np.int32))
     )
-    stage.GetPrimAtPath(part.path).AddAppliedSchema("PhysicsDeformableBodyAPI")
-    mesh.GetPrim().AddAppliedSchema("PhysicsVolumeDeformableSimAPI")
+    if not part.is_rigid:
+        stage.GetPrimAtPath(part.path).AddAppliedSchema("PhysicsDeformableBodyAPI")
+        mesh.GetPrim().AddAppliedSchema("PhysicsVolumeDeformableSimAPI")
     mesh.GetPrim().AddAppliedSchema("PhysicsCollisionAPI")
     material = model.materials[b]
     names = ("youngs_modulus", "poisson_ratio", "density")

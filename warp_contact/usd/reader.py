@@ -19,12 +19,21 @@ FRAMES = 1_000_000  # numbers of frames are below: they have six digits
 
 @dataclass(frozen=True)
 class Body:
-    """A body as it is read: ``mesh`` is its surface, ``sim`` its tets (None if not written)."""
+    """A body as it is read.
+
+    Attributes:
+        label: its name
+        mesh: its surface
+        sim: its tets, None if not written
+        fixed: whether none of its vertices moves freely
+        rigid: whether its prim moves, and not its points
+    """
 
     label: str
     mesh: UsdGeom.Mesh
     sim: UsdGeom.TetMesh | None
     fixed: bool
+    rigid: bool
 
 
 def root_path(path) -> Path:
@@ -143,15 +152,24 @@ def read_bodies(stage: Usd.Stage) -> list[Body]:
             mesh=UsdGeom.Mesh(surface),
             sim=UsdGeom.TetMesh(sim) if sim else None,
             fixed=bool(read_note(prim, "fixed")),
+            rigid=bool(UsdGeom.Xformable(prim).GetOrderedXformOps()),
         )
         found.append((index, body))
     return [body for _, body in sorted(found, key=lambda pair: pair[0])]
 
 
 def read_points(stage: Usd.Stage, frame: int) -> dict[str, np.ndarray]:
-    """Surface points [m] of each body at a frame by its label, shape (n, 3)."""
-    bodies = read_bodies(stage)
-    return {body.label: np.asarray(body.mesh.GetPointsAttr().Get(frame)) for body in bodies}
+    """Surface points [m] of each body at a frame by its label, float32 (n, 3), in the world."""
+    return {body.label: world_points(body.mesh, frame) for body in read_bodies(stage)}
+
+
+def world_points(mesh: UsdGeom.Mesh, frame: float) -> np.ndarray:
+    """The points of a mesh [m] in world coordinates, float32 (n, 3); none where it has none."""
+    points = np.asarray(mesh.GetPointsAttr().Get(frame) or np.zeros((0, 3)), dtype=np.float32)
+    matrix = np.asarray(mesh.ComputeLocalToWorldTransform(frame))  # acts on row vectors
+    if (matrix == np.eye(4)).all():
+        return points
+    return (points @ matrix[:3, :3] + matrix[3, :3]).astype(np.float32)
 
 
 def read_planes(stage: Usd.Stage) -> list[tuple[np.ndarray, float]]:

@@ -9,6 +9,8 @@ Each file is written under another name, put on the disk and renamed, a frame be
 counts it. So at any moment the root names finished frames only, and all of them. The files appear,
 or take the place of those of an earlier run, together with the first frame.
 
+Of a rigid body the prim moves, and its points are written once, in the frame of its mesh.
+
 Each surface carries ``primvars:contact:pressure`` [Pa], ``penetration`` [m] and ``partner``: the
 index of the other body, n_body + p for half-space p, -1 for none. Pressure and penetration are
 rounded to a thousandth of their largest value on the body, which packs them to half the size.
@@ -22,6 +24,7 @@ from pxr import Sdf, Tf, UsdGeom, Vt
 from warp_contact.files import replacing
 from warp_contact.usd.folder import TOPOLOGY, RunFolder, frame_file, frame_files
 from warp_contact.usd.kept import check_frames, check_layers, first_frame
+from warp_contact.usd.motion import motion, motion_types, numbers
 from warp_contact.usd.prims import check_options, heated, parts, topology
 from warp_contact.usd.reader import open_stage
 
@@ -59,7 +62,7 @@ class UsdWriter:
             path: a directory, whose name the root layer takes, or the ``.usda`` root layer itself;
                 or a ``RunFolder``, which is closed with the writer
             sim: the simulation; its model, positions and contact fields are what is written
-            velocities: write the surface velocities [m/s] too
+            velocities: write the surface velocities [m/s] of bodies that deform too
             tets: write each body's TetMesh, purpose guide
             flatten: ``close()`` also writes everything into one ``<name>.usdc``
             animate_tets: time-sample the points of the TetMeshes, inner vertices included
@@ -145,7 +148,7 @@ class UsdWriter:
         """See that the earlier file, up to the frame of the simulation, is what it should be."""
         self.start, self.end = first_frame(self.root), self.sim.frame
         check_layers(self.root, self.layer, list(self.sim.model.labels))
-        lengths = {path: len(value) for path, value in self._values()}
+        lengths = {path: len(numbers(value)) for path, value in self._values()}
         kept = check_frames(self.root.parent, range(self.start, self.end + 1), lengths)
         if not kept:
             raise ValueError(f"{self.root} begins at frame {self.start}, after {self.end}")
@@ -169,10 +172,9 @@ class UsdWriter:
             self.scale = max(self.scale, float(fields["pressure"].max(initial=0.0)))
         color = heated(self.base, fields["pressure"] / (self.scale or 1.0))
         for part in self.parts:
-            mesh, points = f"{part.path}/surface.", Vt.Vec3fArray.FromNumpy(x[part.ids])
-            yield mesh + "points", points
-            yield mesh + "extent", UsdGeom.PointBased.ComputeExtent(points)
-            if v is not None:
+            mesh = f"{part.path}/surface."
+            yield from motion(part, self.sim, x)
+            if v is not None and not part.is_rigid:
                 yield mesh + "velocities", Vt.Vec3fArray.FromNumpy(v[part.ids])
             yield mesh + "primvars:displayColor", Vt.Vec3fArray.FromNumpy(color[part.ids])
             for name in "pressure", "penetration":
@@ -180,7 +182,7 @@ class UsdWriter:
                 yield f"{mesh}primvars:contact:{name}", value
             partner = np.ascontiguousarray(fields["partner"][part.ids], dtype=np.int32)
             yield mesh + "primvars:contact:partner", Vt.IntArray.FromNumpy(partner)
-            if self.animate_tets:
+            if self.animate_tets and not part.is_rigid:
                 points = Vt.Vec3fArray.FromNumpy(x[slice(*part.verts)])
                 yield f"{part.path}/sim.points", points
                 yield f"{part.path}/sim.extent", UsdGeom.PointBased.ComputeExtent(points)
@@ -190,24 +192,23 @@ class UsdWriter:
         layer = Sdf.Layer.CreateAnonymous(".usdc")
         layer.timeCodesPerSecond = layer.framesPerSecond = self.sim.fps
         types = Sdf.ValueTypeNames
-        surface = {
-            "points": types.Point3fArray,
-            "extent": types.Float3Array,
-            "primvars:displayColor": types.Color3fArray,
-            "primvars:contact:pressure": types.FloatArray,
-            "primvars:contact:penetration": types.FloatArray,
-            "primvars:contact:partner": types.IntArray,
+        primvars = {
+            "displayColor": types.Color3fArray,
+            "contact:pressure": types.FloatArray,
+            "contact:penetration": types.FloatArray,
+            "contact:partner": types.IntArray,
         }
-        if self.velocities:
-            surface["velocities"] = types.Vector3fArray
-        prims = {"surface": surface}
-        if self.animate_tets:
-            prims["sim"] = {"points": types.Point3fArray, "extent": types.Float3Array}
         for part in self.parts:
-            for prim, attributes in prims.items():
-                spec = Sdf.CreatePrimInLayer(layer, f"{part.path}/{prim}")
-                for name, kind in attributes.items():
-                    Sdf.AttributeSpec(spec, name, kind)
+            mesh, attributes = f"{part.path}/surface.", motion_types(part)
+            attributes |= {f"{mesh}primvars:{name}": kind for name, kind in primvars.items()}
+            if self.velocities and not part.is_rigid:
+                attributes[mesh + "velocities"] = types.Vector3fArray
+            if self.animate_tets and not part.is_rigid:
+                attributes[f"{part.path}/sim.points"] = types.Point3fArray
+                attributes[f"{part.path}/sim.extent"] = types.Float3Array
+            for path, kind in attributes.items():
+                prim, _, name = path.partition(".")
+                Sdf.AttributeSpec(Sdf.CreatePrimInLayer(layer, prim), name, kind)
         return layer
 
     def _write_root(self, start: int, end: int) -> None:

@@ -1,0 +1,138 @@
+"""contact_data.py: contacts, forces of pairs and of bodies, against momenta and closed forms."""
+
+import numpy as np
+import pytest
+
+import warp_contact as wc
+
+EDGE = 0.1  # of a block [m]
+DENSITY = 1000.0
+RUBBER = wc.NeoHookean(2e5, 0.3, DENSITY, 4e-3)
+WEIGHT = DENSITY * EDGE**3 * 9.81
+KINDS = "explicit", "implicit"
+
+
+def momentum(sim: wc.Simulation, body: str) -> np.ndarray:
+    own = sim._bodies.range(body)
+    return sim.model.mass.numpy()[own].astype(float) @ sim.velocities(body).astype(float)
+
+
+def slope(angle: float, device, kind: str, friction=0.6) -> wc.Simulation:
+    """A block at rest on the floor, with gravity turned about the y axis; half a second."""
+    g = 9.81 * np.array([np.sin(angle), 0.0, -np.cos(angle)])
+    scene = wc.Scene(gravity=g, friction=friction)
+    scene.add_plane((0.0, 0.0, 1.0))
+    scene.add_body(wc.box(EDGE, 3), RUBBER, (0.3, -0.2, 0.5 * EDGE), label="block")
+    sim = wc.Simulation(scene, device=str(device), integrator=kind)
+    for _ in sim.frames(60):
+        pass
+    return sim
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_force_on_a_body_is_its_change_of_momentum(device, rng, kind):
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0), friction=0.4)
+    scene.add_body(wc.box(EDGE, 3), RUBBER, velocity=rng.uniform(-0.1, 0.1, 3), label="a")
+    v = (*rng.uniform(-0.3, 0.3, 2), -1.0)
+    scene.add_body(wc.box(EDGE, 2), RUBBER, (0.02, 0.03, 0.105), velocity=v, label="b")
+    sim = wc.Simulation(scene, fps=240, device=str(device), integrator=kind)
+    before = {body: momentum(sim, body) for body in "ab"}
+    got = {body: np.zeros(3) for body in "ab"}
+    for _ in sim.frames(40):
+        for body, sign in ("a", 1.0), ("b", -1.0):
+            force = sim.force_on(body)
+            got[body] += force / sim.fps
+            if pair := sim.forces().get(("a", "b")):
+                # Impulses are counted in units of 1e-13 of the scene's, and summed in float32.
+                np.testing.assert_allclose(
+                    sign * pair.total, force, atol=1e-5 * np.abs(force).max()
+                )
+    scale = np.abs(before["b"]).max()
+    for body in "ab":
+        change = momentum(sim, body) - before[body]
+        assert np.abs(change).max() > 0.1 * scale  # they have met
+        np.testing.assert_allclose(got[body], change, atol=1e-5 * scale)  # rounding of velocities
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_on_a_slope_the_force_acts_below_the_centre_of_mass(device, kind):
+    angle = 0.3
+    sim = slope(angle, device, kind)
+    force = sim.forces()["block", "plane0"]
+    # At rest to 1e-3: what is left of the vibrations.
+    np.testing.assert_allclose(force.normal, [0.0, 0.0, WEIGHT * np.cos(angle)], atol=2e-3 * WEIGHT)
+    along = [-WEIGHT * np.sin(angle), 0.0, 0.0]
+    np.testing.assert_allclose(force.friction, along, atol=2e-3 * WEIGHT)
+    x = sim.positions("block").astype(float)
+    centre = np.average(x, axis=0, weights=sim.model.mass.numpy())
+    foot = centre[:2] + [centre[2] * np.tan(angle), 0.0]
+    np.testing.assert_allclose(force.point, [*foot, 0.0], atol=5e-3 * EDGE)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_contacts_add_up_to_the_force_of_their_pair(device, kind):
+    sim = slope(0.2, device, kind)
+    c, force = sim.contacts(), sim.forces()["block", "plane0"]
+    assert len(c) > 0 and (c.bodies == [0, 1]).all()
+    # One step of a frame at rest is like the others.
+    each = c.normal_force[:, None] * c.normal + c.friction_force
+    np.testing.assert_allclose(each.sum(axis=0), force.total, atol=2e-3 * WEIGHT)
+    point = np.average(c.point, axis=0, weights=c.normal_force)
+    np.testing.assert_allclose(point, force.point, atol=2e-3 * EDGE)
+    np.testing.assert_array_equal(c.normal, np.tile([0.0, 0.0, 1.0], (len(c), 1)))
+    np.testing.assert_allclose(c.gap, c.point[:, 2], atol=1e-7)  # rounding
+    assert np.abs(c.slip).max() < 1e-3  # [m/s] it rests
+    assert (np.linalg.norm(c.friction_force, axis=1) <= 0.6 * c.normal_force * (1.0 + 1e-5)).all()
+
+
+def test_contacts_of_two_bodies_have_two_sides(device):
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+    scene.add_body(wc.box(EDGE, 2), RUBBER)
+    v = (0.2, 0.0, -1.0)
+    scene.add_body(wc.box(EDGE, 3), RUBBER, (0.01, 0.02, 1.005 * EDGE), velocity=v)
+    sim = wc.Simulation(scene, fps=240, device=str(device))
+    for _ in sim.frames(3):
+        pass
+    c, x = sim.contacts(), sim.positions().astype(float)
+    assert len(c) > 0
+    of = sim.model.vert_body.numpy()[c.vertices]
+    np.testing.assert_array_equal(of[:, [0, 1]], np.repeat(c.bodies[:, :1], 2, axis=1))
+    np.testing.assert_array_equal(of[:, [2, 3, 4]], np.repeat(c.bodies[:, 1:], 3, axis=1))
+    np.testing.assert_allclose(c.weights[:, :2].sum(axis=1), 1.0, atol=1e-6)  # rounding
+    np.testing.assert_allclose(c.weights[:, 2:].sum(axis=1), -1.0, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(c.normal, axis=1), 1.0, atol=1e-6)
+    other = -np.einsum("ck,cki->ci", c.weights[:, 2:], x[c.vertices[:, 2:]])
+    gap = np.einsum("ci,ci->c", c.point - other, c.normal)
+    np.testing.assert_allclose(c.gap, gap, atol=1e-9)
+    up = np.where(c.bodies[:, :1] == 1, c.normal, -c.normal)
+    assert (up[:, 2] > 0.9).all()  # the upper body is pushed upwards
+
+
+def test_chosen_vertices_have_their_share(device):
+    sim = slope(0.1, device, "explicit")
+    low = sim.positions("block")[:, 2] < 0.1 * EDGE
+    whole = sim.force_on("block")
+    np.testing.assert_allclose(sim.force_on("block", low), whole, rtol=1e-12)
+    np.testing.assert_array_equal(sim.force_on("block", ~low), 0.0)
+    pressure, z = sim.contact_fields()["pressure"][low], sim.positions("block")[low]
+    assert np.isfinite(z).all() and (pressure > 0.0).any()
+    with pytest.raises(ValueError, match="block"):
+        sim.force_on("block", [10_000])
+
+
+def test_pressure_over_the_area_is_the_force(device):
+    sim = slope(0.0, device, "explicit", friction=0.0)
+    tris, x = sim.model.tris.numpy(), sim.positions().astype(float)
+    a, b, c = x[tris].transpose(1, 0, 2)
+    size = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
+    area = np.bincount(tris.ravel(), np.repeat(size / 3.0, 3), minlength=len(x))
+    total = float(area @ sim.contact_fields()["pressure"])
+    # Rounding to float32 in each of them.
+    assert total == pytest.approx(sim.forces()["block", "plane0"].normal[2], rel=1e-5)
+
+
+def test_before_a_frame_and_after_a_reset_there_is_nothing(device):
+    sim = slope(0.0, device, "explicit")
+    sim.reset()
+    assert not sim.forces() and len(sim.contacts()) == 0
+    np.testing.assert_array_equal(sim.force_on(0), 0.0)

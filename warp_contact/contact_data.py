@@ -1,0 +1,69 @@
+"""What a user reads of contacts: each of them, forces between bodies and on them, fields."""
+
+import numpy as np
+
+from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.frame.stepper import Stepper
+from warp_contact.measure import contact_data
+from warp_contact.measure.contact_fields import contact_fields
+from warp_contact.measure.measure import Meter
+from warp_contact.scene.scene import Body
+from warp_contact.scene.selection import Bodies
+
+
+class ContactData:
+    """The contacts of the last step and the contact forces of the last frame."""
+
+    fps: float
+    frame: int
+    model: Model
+    state: State
+    _bodies: Bodies
+    _stepper: Stepper
+    _meter: Meter
+
+    def contacts(self) -> contact_data.Contacts:
+        """Contacts of the last step, at the present positions: points, normals, forces, slip.
+
+        A force is that of one step; ``forces`` has the mean of the frame. Bodies asleep have none.
+        """
+        s = self._stepper
+        return contact_data.contacts(self.state, s.work, s.last_dt)
+
+    def forces(self) -> dict[tuple[str, str], contact_data.PairForce]:
+        """Mean contact force of the last frame on the first body of each pair that touched.
+
+        The pairs are named as in ``measure().forces``, in the order in which bodies were added,
+        planes last; each has ``normal`` and ``friction`` [N] and the ``point`` of the first [m].
+        """
+        return contact_data.pair_forces(self._meter.names, self._stepper.work, self._duration)
+
+    def force_on(self, body: Body | int | str, vertices=None) -> np.ndarray:
+        """Mean contact force of the last frame on a body, or on some of its vertices [N], (3,).
+
+        Args:
+            body: the body
+            vertices: mask or ids within the body; None for all
+
+        Raises:
+            ValueError: there is no such body or vertex
+        """
+        every = np.arange(self.model.n_vert)
+        part, chosen = self._bodies.choose(every, body, vertices)
+        return contact_data.force_on(part[chosen], self._stepper.work, self._duration)
+
+    def contact_fields(self) -> dict[str, np.ndarray]:
+        """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
+
+        The partner is a body's index, n_body + p for plane p, -1 for none. Partner and penetration
+        are those of the last detection pass: at the predicted positions, after the closure where it
+        moved surfaces, at the start of the step for a penalty. Persistent contacts of edges have no
+        penetration. Shapes (n_vert,).
+        """
+        return contact_fields(self.model, self.state.x, self._stepper.work, 1.0 / self.fps)
+
+    @property
+    def _duration(self) -> float:
+        """Time over which contact forces were summed [s]."""
+        return 1.0 / self.fps if self.frame else 0.0

@@ -1,0 +1,55 @@
+"""How the motion of a body is written: by its points, or by where its frame is if it is rigid."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from pxr import Gf, Sdf, UsdGeom, Vt
+
+from warp_contact.usd.prims import Part
+
+TRANSLATE, ORIENT = "xformOp:translate", "xformOp:orient"
+BENT = 1e-3  # of the size of a rigid body: how far its vertices may be from its shape
+
+
+def motion_types(part: Part) -> dict[str, Sdf.ValueTypeName]:
+    """The attributes that hold the motion of a body, by their paths."""
+    types, surface = Sdf.ValueTypeNames, f"{part.path}/surface."
+    if part.is_rigid:
+        return {f"{part.path}.{TRANSLATE}": types.Double3, f"{part.path}.{ORIENT}": types.Quatd}
+    return {surface + "points": types.Point3fArray, surface + "extent": types.Float3Array}
+
+
+def motion(part: Part, sim, x: np.ndarray) -> Iterator[tuple]:
+    """Their paths and values at the positions ``x`` [m] of all vertices, float32 (n_vert, 3).
+
+    Raises:
+        ValueError: a body that is rigid, and fixed, was driven out of its shape
+    """
+    if part.is_rigid:
+        yield from zip(motion_types(part), pose(part, sim, x), strict=True)
+        return
+    points = Vt.Vec3fArray.FromNumpy(x[part.ids])
+    values = points, UsdGeom.PointBased.ComputeExtent(points)
+    yield from zip(motion_types(part), values, strict=True)
+
+
+def pose(part: Part, sim, x: np.ndarray) -> tuple[Gf.Vec3d, Gf.Quatd]:
+    """Where the frame of a rigid body is: x = R rest + translation."""
+    place, (i, j, k, real) = sim.pose(part.index)
+    translation, turn = Gf.Vec3d(*place.tolist()), Gf.Quatd(real, i, j, k)
+    turned = part.rest @ np.array(Gf.Matrix3d(turn))  # which acts on row vectors
+    off = np.abs(turned + place - x[slice(*part.verts)]).max()
+    if off > BENT * np.ptp(part.rest, axis=0).max():
+        name, frame = sim.model.labels[part.index], sim.frame
+        raise ValueError(
+            f"body '{name}' is rigid, but what drives it has moved vertices by {off:.3g} m out of "
+            f"its shape at frame {frame}: let its targets turn it, or choose another material"
+        )
+    return translation, turn
+
+
+def numbers(value) -> np.ndarray:
+    """The numbers of a value as it is written."""
+    if isinstance(value, Gf.Quatd):
+        return np.array([value.GetReal(), *value.GetImaginary()])
+    return np.asarray(value)

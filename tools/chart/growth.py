@@ -71,7 +71,7 @@ def draw(path: Path, points: list[Point]) -> None:
     figure = picture.Figure(figsize=(14.0, 6.5), layout="constrained")
     for ax, (kind, (title, along, *_)) in zip(figure.subplots(1, 2), KINDS.items(), strict=True):
         ax.set(xscale="log", yscale="log", xlabel=along, ylabel=picture.SECONDS)
-        ax.set_title(title, fontsize=15, pad=70)
+        ax.set_title(title, fontsize=15, pad=60)
         ax.yaxis.set_major_formatter("{x:g}")
         ax.grid(True, which="major", color="0.9")
         mine = [p for p in points if p.panel.startswith(kind)]
@@ -84,8 +84,9 @@ def draw(path: Path, points: list[Point]) -> None:
                 best[x] = np.fmin(best.get(x, np.nan), cpu)
             ax.plot(*zip(*best.items(), strict=True), label=label, **style)
             lost = [x for x, cpu in best.items() if np.isnan(cpu)]
-            above = {"transform": picture.blend(ax.transData, ax.transAxes), "mfc": "none"}
-            ax.plot(lost, [1.03 + 0.03 * row] * len(lost), ls="", **style, **above)
-        ax.text(-0.01, 1.03, "failed", transform=ax.transAxes, ha="right", fontsize=10)
+            if lost:  # an empty line would spoil the layout
+                style["transform"] = picture.blend(ax.transData, ax.transAxes)
+                ax.plot(lost, [1.03 + 0.03 * row] * len(lost), ls="", mfc="none", **style)
+                ax.text(-0.01, 1.02 + 0.03 * row, "failed", transform=ax.transAxes, ha="right")
         ax.legend(fontsize=11, frameon=False)
     figure.savefig(path, dpi=100)

@@ -56,7 +56,7 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
         Line2D([], [], mfc="none", label="failed", **grey),
     ]
     figure.suptitle(TITLE, fontsize=15)
-    figure.legend(handles=handles, loc="outside lower center", ncols=6, fontsize=12, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=12, frameon=False)
     figure.savefig(path, dpi=100)
 
 

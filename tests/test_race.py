@@ -31,7 +31,7 @@ def test_overlap_and_inverted_tets_are_counted():
     deep, flat = x.copy(), x.copy()
     deep[8:, 2] -= 0.02  # the upper block, into the lower one
     flat[:8, 2] *= -1.0  # the lower block upside down, below the upper one
-    motion = Motion(np.array([x, deep, flat]), np.zeros((3, 16, 3)), "neo-hookean", 1.0, 0.0, 3)
+    motion = Motion(np.array([x, deep, flat]), np.zeros((3, 16, 3)), 1.0, 0.0, 3)
     deepest, last, inverted = race.look(Task(blocks, 60, 2), motion)
     finer = wc.box(0.06, 1)
     edge = np.linalg.norm(np.diff(finer.vertices[finer.edges], axis=1), axis=2).mean()
@@ -44,7 +44,7 @@ def test_a_run_without_a_motion_gives_its_reason_and_time():
     import race
     from engines.task import Motion, Task
 
-    motion = Motion(wall=412.3, reason="too slow: 3 of 60 frames in 20 s")
+    motion = Motion(cpu=412.3, reason="too slow: 3 of 60 frames in 20 s")
     cells = race.cells(Task(blocks, 60, 2), motion)
     assert cells == ["", "412", "", "", "too slow: 3 of 60 frames in 20 s"]
 

@@ -1,4 +1,4 @@
-"""Draw error against wall time, for this package and for engines outside.
+"""Draw error against CPU time, for this package and for engines outside.
 
     python tools/pareto.py [task ...] [--out DIR] [--python PATH] [--repeats N]
     python tools/pareto.py --draw FILE
@@ -8,8 +8,8 @@ given the same coefficient of damping (what each makes of it stands in ``tools/e
 judged by its positions alone. Contact detection is inside the time; compiling, loading and the
 first frame are outside and stand in a column of their own. An engine that is not installed under
 ``--python`` is in the table with that reason. Writes pareto.csv, the pictures pareto.png with all
-panels and summary.png with four of them, and pareto.txt. ``--draw`` measures nothing: it draws the
-pictures of a table again, beside it.
+panels, summary.png with four of them and growth.png (``chart/growth.py``), and pareto.txt.
+``--draw`` measures nothing: it draws the pictures of a table again, beside it.
 """
 
 import sys
@@ -17,7 +17,7 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
-from chart import closed_forms, points, scenes
+from chart import closed_forms, growth, points, scenes
 from chart.panel import Panel
 from chart.points import Point
 from engines import ours
@@ -26,11 +26,12 @@ from engines.task import Failed, Motion, Task
 from measure import machine
 from measure.run import command_line, count, one_of
 
-TASKS = closed_forms.TASKS | {name: scenes.scene(name) for name in scenes.TITLES}
-LIMIT = 12.0  # wall seconds of one run
+TASKS = closed_forms.TASKS | {name: scenes.scene(name) for name in scenes.TITLES} | growth.TASKS
+LIMIT = 12.0  # CPU s of one run
 PENALTIES = "penalty", "virtual"
-HEAD = """Error against wall time, {} run(s) of each, {:.0f} s in all.
+HEAD = """Error against CPU time, {} run(s) of each, {:.0f} s in all.
 {}; outside: {}.
+Times are of the CPU, so that other work on the machine counts little; each engine uses one thread.
 Kernels are compiled and the first frame is stepped before the clock starts. Failures are behind \
 everything. Error and time of a method are those of the same setting."""
 
@@ -44,16 +45,16 @@ def main() -> int:
     parser.add_argument("--repeats", type=count, default=3, help="of all; times are medians")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="a table to draw again")
     args = parser.parse_args()
-    chosen = [TASKS[name] for name in args.tasks or TASKS]
-    titles = {panel.name: panel.title for _, panels in chosen for panel in panels}
+    chosen = {name: TASKS[name] for name in args.tasks or TASKS}
+    titles = {panel.name: panel.title for _, panels in chosen.values() for panel in panels}
     if args.draw:
         draw(args.draw.parent, titles, shown(points.read(args.draw)))
         return 0
     begin, rounds, outside = perf_counter(), [], versions(args.python)
     for _ in range(args.repeats):
         rounds.append([])
-        for task, panels in chosen:
-            for run in runs(task, ours.ALL, SWEEPS, args.python, LIMIT):
+        for name, (task, panels) in chosen.items():
+            for run in runs(task, *growth.WHO.get(name, (ours.ALL, SWEEPS)), args.python, LIMIT):
                 rounds[-1] += judge(task, panels, *run)
         # After every round: a long run leaves what it has.
         found = [middle(same) for same in zip(*rounds, strict=True)]
@@ -76,7 +77,7 @@ def judge(task: Task, panels: list[Panel], method: str, setting: str, motion: Mo
                 error, outcome = panel.error(task, motion), "ok"
         except Failed as failed:
             outcome = str(failed)
-        point = Point(panel.name, method, setting, motion.wall, error, outcome, motion.startup)
+        point = Point(panel.name, method, setting, motion.cpu, error, outcome, motion.startup)
         print(*point, sep="  ", flush=True)
         yield point
 
@@ -84,7 +85,7 @@ def judge(task: Task, panels: list[Panel], method: str, setting: str, motion: Mo
 def middle(same: tuple[Point, ...]) -> Point:
     """Repeats of a point as one; a run that fails once has failed."""
     failed = [p for p in same if p.error is None]
-    return failed[0] if failed else same[0]._replace(wall=median(p.wall for p in same))
+    return failed[0] if failed else same[0]._replace(cpu=median(p.cpu for p in same))
 
 
 def shown(found: list[Point]) -> list[Point]:
@@ -96,12 +97,17 @@ def shown(found: list[Point]) -> list[Point]:
 
 
 def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:
-    """The picture of all panels and that of four."""
+    """The picture of all panels, that of four, and that of how times grow."""
     from chart import picture  # matplotlib: the table needs none
 
-    picture.draw(folder / "pareto.png", titles, found)
-    if {p.panel for p in found}.issuperset(picture.SUMMARY):
+    there = {p.panel for p in found}
+    errors = {name: title for name, title in titles.items() if name not in growth.TASKS}
+    if errors:
+        picture.draw(folder / "pareto.png", errors, found)
+    if there.issuperset(picture.SUMMARY):
         picture.draw(folder / "summary.png", picture.SUMMARY, found)
+    if there.issuperset(growth.TASKS):
+        growth.draw(folder / "growth.png", found)
 
 
 if __name__ == "__main__":

@@ -3,12 +3,11 @@
     python tools/race.py [scene ...] [--python PATH]
 
 Every engine gets the same vertices, tets, masses and coefficient of damping and is judged from its
-positions, as in ``tools/pareto.py``; each runs once, so that no time is better than the machine is
-quiet. Nothing is swept: the settings are a fast and a plain one of each engine, in large scenes the
-fast one.
+positions, as in ``tools/pareto.py``; each runs once, in one thread. Nothing is swept: the settings
+are a fast and a plain one of each engine, in large scenes the fast one.
 
     steps       of a frame
-    s / s       wall seconds per simulated second, compiling and the first frame left out
+    s / s       CPU seconds per simulated second, compiling and the first frame left out
     overlap     deepest one after any frame, in edges of the finer body
     at the end  the same after the last frame
     inverted    tets that are inside out after the last frame
@@ -17,7 +16,7 @@ fast one.
 import sys
 
 from chart.scenes import overlaps
-from engines.ours import DEFAULT
+from engines.ours import DEFAULT, IMPLICIT
 from engines.runs import SWEEPS, runs, versions
 from engines.task import Motion, Task
 from measure import machine
@@ -28,8 +27,9 @@ import warp_contact as wc
 from warp_contact.scenes import load
 
 FPS = 60
-LIMIT = 400.0  # wall seconds of one run
+LIMIT = 400.0  # CPU s of one run
 SETTINGS = {"Newton VBD": (1, 5), "Newton XPBD": (8, 4), "MuJoCo flex": (2, 5)}  # fast, plain
+OURS = {DEFAULT.method: "ours", IMPLICIT.method: "ours implicit"}
 COLUMNS = {"scene": 18, "engine": 13, "steps": 6, "s / s": 8, "overlap": 9, "at the end": 10}
 TABLE = Table(**COLUMNS, inverted=0)
 
@@ -64,19 +64,18 @@ def main() -> int:
         build, seconds, count = RACES[name]
         task = Task(build, FPS, round(seconds * FPS))
         others = {e: [SWEEPS[e][k] for k in rows[:count]] for e, rows in SETTINGS.items()}
-        for engine, _, motion in runs(task, [DEFAULT], others, args.python, LIMIT):
-            who = "warp_contact" if engine == DEFAULT.method else engine
-            print(TABLE.line(name, who, *cells(task, motion)), flush=True)
+        for engine, _, motion in runs(task, [DEFAULT, IMPLICIT], others, args.python, LIMIT):
+            print(TABLE.line(name, OURS.get(engine, engine), *cells(task, motion)), flush=True)
     return 0
 
 
 def cells(task: Task, motion: Motion) -> list[str]:
     """Of the line of a motion; that of a failure ends with its reason."""
-    wall = "" if motion.wall is None else f"{motion.wall:.3g}"
+    cpu = "" if motion.cpu is None else f"{motion.cpu:.3g}"
     if motion.reason:
-        return ["", wall, "", "", motion.reason]
+        return ["", cpu, "", "", motion.reason]
     deepest, last, inverted = look(task, motion)
-    return [str(motion.steps), wall, f"{deepest:.2g}", f"{last:.2g}", str(inverted)]
+    return [str(motion.steps), cpu, f"{deepest:.2g}", f"{last:.2g}", str(inverted)]
 
 
 def look(task: Task, motion: Motion) -> tuple[float, float, int]:

@@ -2,13 +2,10 @@
 
 Forces and energies come from positions alone, in double precision, for any engine:
 
-    neo-hookean  psi = mu/2 (I_C - 3) - mu (J - 1) + (lam + mu)/2 (J - 1)^2
-                 P   = mu F + ((lam + mu)(J - 1) - mu) cof F
-    st-venant    psi = mu E : E + lam/2 (tr E)^2,  P = F (2 mu E + lam tr E I)
+    psi = mu/2 (I_C - 3) - mu (J - 1) + (lam + mu)/2 (J - 1)^2
+    P   = mu F + ((lam + mu)(J - 1) - mu) cof F
 
-with the Green strain E = (F^T F - I)/2. An engine is judged by the law it simulates; both laws
-agree at small strains. Sources: Smith, de Goes, Kim 2018; Ogden 1997, Non-linear Elastic
-Deformations.
+the stable neo-Hookean law that all engines simulate. Source: Smith, de Goes, Kim 2018.
 """
 
 from collections.abc import Callable
@@ -22,12 +19,12 @@ import warp_contact as wc
 
 
 class Elastic(Numbered):
-    """The bodies of a scene as linear tets under one law."""
+    """The bodies of a scene as linear neo-Hookean tets."""
 
-    def __init__(self, scene: wc.Scene, law: str):
+    def __init__(self, scene: wc.Scene):
         super().__init__(scene)
         lame = [np.tile(b.material.lame(), (len(b.mesh.tets), 1)) for b in scene.bodies]
-        self.lame, self.law = np.concatenate(lame).T[..., None, None], law
+        self.lame = np.concatenate(lame).T[..., None, None]
         self.grad = gradients(self.rest, self.tets)
         self.volume = 1.0 / np.linalg.det(self.grad[:, 1:]) / 6.0
 
@@ -37,27 +34,23 @@ class Elastic(Numbered):
 
     def forces(self, x: np.ndarray) -> np.ndarray:
         """Internal forces on all vertices [N], shape (n, 3)."""
-        _, p = response(self.deformation(x), *self.lame, self.law)
+        _, p = response(self.deformation(x), *self.lame)
         out = np.zeros((len(x), 3))
         np.add.at(out, self.tets, -np.einsum("t,tij,tcj->tci", self.volume, p, self.grad))
         return out
 
     def energy(self, x: np.ndarray) -> float:
         """Elastic energy [J]."""
-        density, _ = response(self.deformation(x), *self.lame, self.law)
+        density, _ = response(self.deformation(x), *self.lame)
         return float(self.volume @ density.ravel())
 
 
-def response(f: np.ndarray, mu, lam, law: str) -> tuple[np.ndarray, np.ndarray]:
+def response(f: np.ndarray, mu, lam) -> tuple[np.ndarray, np.ndarray]:
     """Densities psi [J/m^3], shape (..., 1, 1), and P [Pa], shape (..., 3, 3), at the given F."""
-    green = 0.5 * (np.swapaxes(f, -1, -2) @ f - np.eye(3))
-    trace = np.trace(green, axis1=-2, axis2=-1)[..., None, None]
-    if law == "st-venant":
-        square = (green**2).sum(axis=(-2, -1), keepdims=True)
-        return mu * square + 0.5 * lam * trace**2, f @ (2.0 * mu * green + lam * trace * np.eye(3))
+    stretched = 0.5 * ((f**2).sum(axis=(-2, -1), keepdims=True) - 3.0)
     grown = np.linalg.det(f)[..., None, None] - 1.0
     cof = np.cross(np.roll(f, -1, axis=-1), np.roll(f, -2, axis=-1), axis=-2)
-    density = mu * (trace - grown) + 0.5 * (lam + mu) * grown**2
+    density = mu * (stretched - grown) + 0.5 * (lam + mu) * grown**2
     return density, mu * f + ((lam + mu) * grown - mu) * cof
 
 
@@ -70,8 +63,8 @@ class Panel(NamedTuple):
 
 
 def sound(task: Task, motion: Motion) -> Elastic:
-    """The bodies under the law that the engine simulates; ``Failed`` where tets end inverted."""
-    solid = Elastic(task.scene(), motion.law)
+    """The bodies; ``Failed`` where tets end inverted."""
+    solid = Elastic(task.scene())
     ratio = float(np.linalg.det(solid.deformation(motion.x[-1])).min())
     if ratio <= 0.0:
         raise Failed(f"tets left inverted (volume ratio {ratio:.2g})")

@@ -1,4 +1,4 @@
-"""The pictures: error against wall time, one panel each, failures on a rail at the top."""
+"""The pictures: error against CPU time, one panel each, failures on a rail at the top."""
 
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from chart.points import Point, front
 rcParams["axes.labelsize"] = 12
 STYLES = {  # method: (colour, marker, what a newcomer is told)
     "default": ("#c8401e", "o", "warp_contact, default"),
+    "implicit": ("#d6559b", "*", "the same, implicit steps"),
     "impulses alone": ("#8a5a9e", "p", "its impulses alone"),
     "predicted": ("#3d9a93", "h", "predicted forces"),
     "literal": ("#e8a33d", "D", "the paper's search, as written"),
@@ -28,6 +29,7 @@ SUMMARY = {  # panel: its title and what the error is, in the small picture
     "squeezed_sphere": "Squeezed sphere: overlap or gap\noverlap or gap, of an edge",
     "cubes_on_membrane": "Cubes on a membrane: overlap or gap\noverlap or gap, of an edge",
 }
+SECONDS = "CPU seconds per simulated second"
 TITLE = "Error against computing time, same meshes and masses for all; lower left is better"
 FLOOR = 0.1  # an error of zero is drawn at this part of the smallest other one, and marked
 RAIL = 1.035  # height of the rail, of the panel
@@ -44,7 +46,7 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
     for ax, (name, title) in zip(axes.flat, titles.items(), strict=False):
         panel(ax, title, [p for p in points if p.panel == name])
     handles = []
-    for method in dict.fromkeys(p.method for p in points):
+    for method in dict.fromkeys(p.method for p in points if p.panel in titles):
         colour, marker, label = STYLES.get(method, OTHER)
         handles.append(Line2D([], [], color=colour, marker=marker, ms=9.0, label=label))
     grey = {"color": "0.5", "marker": "o", "ls": ""}
@@ -54,14 +56,14 @@ def draw(path: Path, titles: dict[str, str], points: list[Point]) -> None:
         Line2D([], [], mfc="none", label="failed", **grey),
     ]
     figure.suptitle(TITLE, fontsize=15)
-    figure.legend(handles=handles, loc="outside lower center", ncols=6, fontsize=12, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=12, frameon=False)
     figure.savefig(path, dpi=100)
 
 
 def panel(ax, title: str, points: list[Point]) -> None:
     """Points, the front of each method, that of all, and each failure on a rail at the top."""
     title, _, error = title.partition("\n")
-    ax.set(xscale="log", yscale="log", xlabel="wall seconds per simulated second", ylabel=error)
+    ax.set(xscale="log", yscale="log", xlabel=SECONDS, ylabel=error)
     ax.set_title(title, fontsize=15, pad=26)
     ax.xaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
@@ -77,7 +79,7 @@ def panel(ax, title: str, points: list[Point]) -> None:
         ax.text(-0.01, RAIL, "failed", **style)
 
     def draw_all(draw, some: list[Point], **style) -> None:
-        draw([p.wall for p in some], [p.error or floor for p in some], **style)
+        draw([p.cpu for p in some], [p.error or floor for p in some], **style)
 
     draw_all(ax.step, front(points), where="post", color="black", linewidth=6, alpha=0.12)
     for method in reversed(dict.fromkeys(p.method for p in points)):  # the default lies on top
@@ -89,5 +91,5 @@ def panel(ax, title: str, points: list[Point]) -> None:
         draw_all(ax.step, front(mine), where="post", color=colour, linewidth=1.8)
         for p in points:
             if p.method == method and p.error is None:  # at its time, without one at the right end
-                where = blend(ax.transData if p.wall else ax.transAxes, ax.transAxes)
-                ax.plot(p.wall or 1.0, RAIL, transform=where, clip_on=False, mfc="none", **dots)
+                where = blend(ax.transData if p.cpu else ax.transAxes, ax.transAxes)
+                ax.plot(p.cpu or 1.0, RAIL, transform=where, clip_on=False, mfc="none", **dots)

@@ -5,7 +5,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
-HEAD = "panel", "method", "setting", "wall s per simulated s", "error", "outcome", "start-up s"
+HEAD = "panel", "method", "setting", "CPU s per simulated s", "error", "outcome", "start-up s"
 BY_ERROR = attrgetter("error")
 
 
@@ -15,10 +15,10 @@ class Point(NamedTuple):
     panel: str
     method: str
     setting: str  # its knobs, as text
-    wall: float | None  # seconds per simulated second; None where nothing could be timed
+    cpu: float | None  # seconds per simulated second; None where nothing could be timed
     error: float | None = None  # None where the run has failed
     outcome: str = "ok"  # or the reason why there is no error
-    startup: float | None = None  # seconds up to the end of the first frame: build, compile or load
+    startup: float | None = None  # CPU s up to the end of the first frame: build, compile or load
 
 
 def write(path: Path, points: list[Point]) -> None:
@@ -32,9 +32,9 @@ def read(path: Path) -> list[Point]:
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))[1:]
     found = []
-    for *names, wall, error, outcome, startup in rows:
-        wall, error, startup = (float(n) if n else None for n in (wall, error, startup))
-        found.append(Point(*names, wall, error, outcome, startup))
+    for *names, cpu, error, outcome, startup in rows:
+        cpu, error, startup = (float(n) if n else None for n in (cpu, error, startup))
+        found.append(Point(*names, cpu, error, outcome, startup))
     return found
 
 
@@ -42,14 +42,14 @@ def dominates(a: Point, b: Point) -> bool:
     """Whether ``a`` is no worse in time and error, and better in one; failures dominate nothing."""
     if a.error is None or b.error is None:
         return a.error is not None
-    return a.wall <= b.wall and a.error <= b.error and (a.wall, a.error) != (b.wall, b.error)
+    return a.cpu <= b.cpu and a.error <= b.error and (a.cpu, a.error) != (b.cpu, b.error)
 
 
 def front(points: list[Point]) -> list[Point]:
     """The points that none dominates, the fastest first; failures are never among them."""
     fine = [p for p in points if p.error is not None]
     return sorted(
-        (p for p in fine if not any(dominates(q, p) for q in fine)), key=attrgetter("wall")
+        (p for p in fine if not any(dominates(q, p) for q in fine)), key=attrgetter("cpu")
     )
 
 
@@ -85,4 +85,4 @@ def panel(points: list[Point]) -> list[str]:
 
 
 def _show(p: Point) -> str:
-    return f"{p.method} ({p.setting}), {p.wall:.3g} s per s, error {p.error:.2g}"
+    return f"{p.method} ({p.setting}), {p.cpu:.3g} s per s, error {p.error:.2g}"

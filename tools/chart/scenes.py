@@ -6,11 +6,10 @@ is one too: a method that keeps bodies apart by a margin has no overlap, and a g
 The motion has no closed form. It is compared with that of the default at ``CONVERGED`` times the
 steps, which half as many change by 1e-4 to 2e-4 of an edge. The reference is our own, so for our
 methods the figure tells how consistent they are. Others confirm it: the stiffest penalty and the
-predicted forces come within 0.3 to 1.2 % of an edge of it. An engine with another law of elasticity
-moves otherwise by the difference of the laws, which no part of this figure takes out.
+predicted forces come within 0.3 to 1.2 % of an edge of it.
 """
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from engines import ours
@@ -49,6 +48,7 @@ def apart(task: Task, motion: Motion) -> float:
     return max(inside(task, motion), gap(task, motion))
 
 
+@lru_cache(maxsize=1)
 def inside(task: Task, motion: Motion) -> float:
     """Deepest overlap after any frame, in edges of the finer body of the two."""
     sound(task, motion)
@@ -87,6 +87,7 @@ def overlaps(task: Task, motion: Motion):
         yield in_edges(sim, measured), measured
 
 
+@lru_cache(maxsize=1)  # panels ask for it in turn
 def gap(task: Task, motion: Motion) -> float:
     """Distance of the worst of the ``PRESSED`` pairs, in edges of its finer body.
 

@@ -9,7 +9,7 @@ import os
 import pickle
 import sys
 from functools import partial
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -31,29 +31,30 @@ def main(make) -> None:
 
 
 def play(make, fps: float, frames: int, stop: int | None, limit: float) -> dict:
-    """The fields of a ``Motion`` but its law, of what ``make()`` returns.
+    """The fields of a ``Motion``, of what ``make()`` returns.
 
-    The first frame, which compiles and captures, is not timed. Held vertices stand still after the
-    frame ``stop``; the run is given up after ``limit`` wall seconds.
+    Times are those of the CPU, in all threads of the process. The first frame, which compiles and
+    captures, is not timed. Held vertices stand still after the frame ``stop``; the run is given up
+    after ``limit`` seconds.
     """
-    begin = perf_counter()
+    begin = process_time()
     engine = make()
     states = [(engine.positions(), engine.velocities())]
-    wall = 0.0
+    cpu = 0.0
     for frame in range(1, frames + 1):
         if frame - 1 == stop:
             engine.halt()
-        start = perf_counter()
+        start = process_time()
         engine.step_frame()
-        wall += perf_counter() - start
+        cpu += process_time() - start
         if frame == 1:
-            startup, wall = perf_counter() - begin, 0.0
+            startup, cpu = process_time() - begin, 0.0
         states.append((engine.positions(), engine.velocities()))
-        rate = wall * fps / max(frame - 1, 1)
+        rate = cpu * fps / max(frame - 1, 1)
         if not np.isfinite(states[-1][0]).all():
-            return {"reason": f"not finite after frame {frame}", "wall": rate or None}
-        if wall > limit and frame < frames:
+            return {"reason": f"not finite after frame {frame}", "cpu": rate or None}
+        if cpu > limit and frame < frames:
             reason = f"too slow: {frame} of {frames} frames in {limit:.3g} s"
-            return {"reason": reason, "wall": rate}
+            return {"reason": reason, "cpu": rate}
     x, v = map(np.array, zip(*states, strict=True))
-    return {"x": x, "v": v, "wall": rate, "startup": startup, "steps": engine.substeps}
+    return {"x": x, "v": v, "cpu": rate, "startup": startup, "steps": engine.substeps}

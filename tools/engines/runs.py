@@ -7,9 +7,12 @@ packages. Each result is written as it comes: a process which dies takes none wi
 
 import io
 import pickle
+import resource
+import signal
 import subprocess
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,10 +21,10 @@ import numpy as np
 from engines import ours
 from engines.task import Motion, Numbered, Task
 
-ENGINES = {  # their adapters and their laws of elasticity
-    "Newton VBD": ("newton_solvers.py", "neo-hookean"),
-    "Newton XPBD": ("newton_solvers.py", "neo-hookean"),
-    "MuJoCo flex": ("mujoco_flex.py", "st-venant"),
+ENGINES = {  # their adapters
+    "Newton VBD": "newton_solvers.py",
+    "Newton XPBD": "newton_solvers.py",
+    "MuJoCo flex": "mujoco_flex.py",
 }
 KNOBS = {  # and their values, setting by setting; the adapters explain them
     "Newton VBD": {
@@ -47,7 +50,7 @@ SWEEPS = {
     engine: [dict(zip(knobs, row, strict=True)) for row in zip(*knobs.values(), strict=True)]
     for engine, knobs in KNOBS.items()
 }
-GRACE = 300.0  # seconds for imports and kernels, on top of the limits of the runs
+GRACE = 300.0  # CPU s for imports and kernels, on top of the limits of the runs
 VERSIONS = """from importlib import metadata as m
 for p in "newton", "mujoco", "warp-lang":
     print(p, m.version(p) if list(m.distributions(name=p)) else "not installed")"""
@@ -59,14 +62,14 @@ def runs(
     """Method, knobs as text and motion of all our ``own`` settings and those of the ``others``.
 
     The others are parts of ``SWEEPS``, their engines those of the interpreter ``python``. A run is
-    given up after ``limit`` wall seconds. Steps of our own are multiples of those that the same
-    method takes by itself.
+    given up after ``limit`` CPU seconds. Steps of our own are their own, or multiples of those that
+    the same method takes by itself.
     """
     steps = {}
     for setting in own:
         alike = setting.method, setting.times
         if setting.factor == 1:
-            motion = ours.run(task, setting, None, limit)
+            motion = ours.run(task, setting, setting.steps, limit)
             steps[alike] = motion.steps
         elif steps.get(alike):
             motion = ours.run(task, setting, setting.factor * steps[alike], limit)
@@ -83,20 +86,18 @@ def outside(
     task: Task, engine: str, settings: list[dict], python: str, limit: float
 ) -> Iterator[Motion]:
     """The motion of every setting in turn."""
-    adapter, law = ENGINES[engine]
-    command = [python, str(Path(__file__).with_name(adapter)), engine]
+    command = [python, str(Path(__file__).with_name(ENGINES[engine])), engine]
     job = pickle.dumps((plain(task), (task.fps, task.frames, task.stop, limit), settings))
-    time = GRACE + limit * len(settings)
-    try:
-        done = subprocess.run(command, input=job, capture_output=True, timeout=time)
-        found, said = done.stdout, done.stderr.decode()
-        reason = said.strip().rpartition("\n")[2] or f"exit code {done.returncode}"
-    except subprocess.TimeoutExpired as late:
-        found, reason = late.stdout or b"", "too slow: the process was stopped"
-    results = io.BytesIO(found)
+    most = 2 * (round(GRACE + limit * len(settings)),)
+    bound = partial(resource.setrlimit, resource.RLIMIT_CPU, most)
+    done = subprocess.run(command, input=job, capture_output=True, preexec_fn=bound)
+    reason = done.stderr.decode().strip().rpartition("\n")[2] or f"exit code {done.returncode}"
+    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        reason = "too slow: the process was stopped"
+    results = io.BytesIO(done.stdout)
     for _ in settings:
         try:
-            yield Motion(law=law, **pickle.load(results))
+            yield Motion(**pickle.load(results))
         except (EOFError, pickle.UnpicklingError):
             yield Motion(reason=reason)
 

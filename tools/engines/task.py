@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,14 +13,14 @@ class Failed(Exception):
     """A motion that has no error to show; the message is the reason."""
 
 
-class Motion(NamedTuple):
+@dataclass(frozen=True, eq=False)  # each run is itself alone, whatever its arrays
+class Motion:
     """One run, as positions and velocities after each frame, or the reason why there is none."""
 
     x: np.ndarray | None = None  # (frames + 1, n, 3) [m], the start included
     v: np.ndarray | None = None  # the same [m/s]
-    law: str = "neo-hookean"  # of elasticity, by which the engine is judged
-    wall: float | None = None  # seconds per simulated second, with detection; None if never timed
-    startup: float | None = None  # seconds up to the end of the first frame: build, compile or load
+    cpu: float | None = None  # CPU s per simulated s, with detection; None if never timed
+    startup: float | None = None  # CPU s up to the end of the first frame: build, compile or load
     steps: int = 0  # of the last frame
     reason: str = ""
 

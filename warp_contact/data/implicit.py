@@ -71,6 +71,8 @@ class ImplicitWork:
         y: R^T P^T p, shape (n_vert,)
         impulse, answer: impulses on the vertices, and how they answer, shape (n_vert,)
         before: velocities or positions before the sweeps, shape (n_vert,)
+        predicted: velocities without the contacts of the step, shape (n_vert,)
+        total: impulses of its contacts so far, shape (n_vert,)
         share: of the vertices in their contacts
         touched: vertices of each body with contacts
         counted: contacts in the row sums, shape (contacts,)
@@ -102,6 +104,8 @@ class ImplicitWork:
     impulse: wp.array[wp.vec3]
     answer: wp.array[wp.vec3]
     before: wp.array[wp.vec3]
+    predicted: wp.array[wp.vec3]
+    total: wp.array[wp.vec3]
     share: Shares
     touched: Touched
     counted: wp.array[int]
@@ -122,6 +126,7 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
     n, n_tet = model.n_vert, model.n_tet
     damped = any(e.damped for e in shapes.implicit.elements)
     names = ("x", "f", "r", "z", "p", "ap", "dv", "y", "impulse", "answer", "before")
+    names += "predicted", "total"
     vectors = {k: wp.zeros(n, dtype=wp.vec3) for k in names}
     return ImplicitWork(
         bodies=_bodies(model, shapes, awake),

@@ -21,21 +21,25 @@ class WarmStart:
         kept: tangential and normal impulse of that contact [N s], shape (n_vert,)
         n_edge: contacts of edges in the last step, shape (1,)
         edges: these, with their impulses, sorted by edge and body, shape (capacity.contacts,)
+        lacking: what the answer of implicit bodies to the contacts of the last step lacked [N s],
+            shape (n_vert,), or (0,) without such bodies
     """
 
     partner: wp.array[int]
     kept: wp.array[wp.vec4]
     n_edge: wp.array[int]
     edges: wp.array[EdgeContact]
+    lacking: wp.array[wp.vec3]
 
 
-def allocate(n_vert: int, n_contact: int) -> WarmStart:
+def allocate(n_vert: int, n_contact: int, implicit: bool) -> WarmStart:
     """Allocate before any step."""
     return WarmStart(
         partner=wp.full(n_vert, -1, dtype=int),
         kept=wp.zeros(n_vert, dtype=wp.vec4),
         n_edge=wp.zeros(1, dtype=int),
         edges=wp.zeros(n_contact, dtype=EdgeContact),
+        lacking=wp.zeros(n_vert if implicit else 0, dtype=wp.vec3),
     )
 
 
@@ -43,6 +47,7 @@ def forget(warm: WarmStart) -> None:
     """The next step has no impulses to start from."""
     warm.partner.fill_(-1)
     warm.n_edge.zero_()
+    warm.lacking.zero_()
 
 
 def copied(warm: WarmStart) -> WarmStart:
@@ -56,6 +61,7 @@ def copy(to: WarmStart, of: WarmStart) -> None:
     wp.copy(to.kept, of.kept)
     wp.copy(to.n_edge, of.n_edge)
     wp.copy(to.edges, of.edges, count=min(len(to.edges), len(of.edges)))
+    wp.copy(to.lacking, of.lacking)
 
 
 def recall(
@@ -65,7 +71,8 @@ def recall(
 
     Where the contacts of edges do not fit, ``needed`` says how many there are.
     """
-    for array, kept in ((to.partner, of.partner), (to.kept, of.kept)):
+    both = (to.partner, of.partner), (to.kept, of.kept), (to.lacking, of.lacking)
+    for array, kept in both if len(to.lacking) else both[:2]:
         mine, theirs = array.numpy().copy(), kept.numpy()
         mine[verts] = theirs[verts]
         array.assign(mine)
@@ -86,6 +93,7 @@ def values(warm: WarmStart) -> dict[str, np.ndarray]:
     """What a checkpoint needs of it."""
     n = int(warm.n_edge.numpy()[0])
     arrays = {"partner": warm.partner, "kept": warm.kept, "n_edge": warm.n_edge}
+    arrays["lacking"] = warm.lacking
     edges = warm.edges.numpy()[:n]
     return {k: array.numpy() for k, array in arrays.items()} | {"edges": edges}
 
@@ -95,6 +103,7 @@ def restore(warm: WarmStart, stored: dict[str, np.ndarray]) -> None:
     warm.partner.assign(stored["partner"])
     warm.kept.assign(stored["kept"])
     warm.n_edge.assign(stored["n_edge"])
+    warm.lacking.assign(stored["lacking"])
     edges = stored["edges"]
     if len(edges):
         wp.copy(warm.edges, wp.array(edges, dtype=EdgeContact), count=len(edges))

@@ -124,7 +124,7 @@ def allocate_work(
         sweeps=sweeps.allocate(n, m),
         surface=of_surface,
         forces=forces,
-        warm=warm_start.allocate(n, m),
+        warm=warm_start.allocate(n, m, shapes is not None),
     )
 
 

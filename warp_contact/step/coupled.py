@@ -142,7 +142,8 @@ def _collect(model: Model, work: Work, moves: wp.array) -> None:
 
 def _record(model: Model, work: Work) -> None:
     inputs = [work.contacts.graph, work.implicit.impulse]
-    launch_over(kernels.record, model.n_vert, inputs=inputs, outputs=[work.forces.received])
+    for sums in work.forces.received, work.implicit.total:
+        launch_over(kernels.record, model.n_vert, inputs=inputs, outputs=[sums])
 
 
 def _add(model: Model, before: wp.array, y: wp.array, work: Work) -> None:

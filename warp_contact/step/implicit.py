@@ -20,11 +20,23 @@ def kick(model: Model, state: State, work: Work) -> None:
     w = work.implicit
     find_mobility(model, state.x, w)
     _find_forces(model, state, work)
-    _find_load(model, state, w)
+    _find_load(model, state, w, work.warm.lacking)
     _conjugate_gradients(model, state.x, work)
     _rigid_part(model, w.dv, state.x, w)
     inputs = [state.x, w.dv, wp.vec3(*model.gravity), work.dt, w.bodies, w.of]
     wp.launch(predict.kick, model.n_vert, inputs=inputs, outputs=[state.v])
+    wp.copy(w.predicted, state.v)
+    w.total.zero_()
+
+
+def find_lacking(model: Model, state: State, work: Work) -> None:
+    """Set what the answer of the bodies to the contacts of this step lacked; before the drift."""
+    w, n = work.implicit, model.n_vert
+    wp.launch(predict.change, n, inputs=[w.bodies, w.predicted, state.v], outputs=[w.p])
+    _multiply(model, state.x, w.p, w.ap, w, w.every)
+    wp.launch(
+        predict.lack, model.n_body, inputs=[w.bodies, w.total, w.ap], outputs=[work.warm.lacking]
+    )
 
 
 def push(model: Model, state: State, work: Work, part: float) -> None:
@@ -91,7 +103,7 @@ def _find_forces(model: Model, state: State, work: Work) -> None:
     wp.launch(predict.sum_forces, model.n_vert, inputs=inputs, outputs=[w.f])
 
 
-def _find_load(model: Model, state: State, w: ImplicitWork) -> None:
+def _find_load(model: Model, state: State, w: ImplicitWork, lacking: wp.array) -> None:
     """Set the right-hand side ``r``."""
     d, n, x, v = w.bodies, model.n_vert, state.x, state.v
     of_fixed = w.none
@@ -104,7 +116,7 @@ def _find_load(model: Model, state: State, w: ImplicitWork) -> None:
     wp.launch(predict.unresolved, n, inputs=[d, v, w.z], outputs=[w.p])
     apply_stiffness(model, x, w.p, w.stiff)
     at_vertex = [model.vt_start, model.vt_corner, w.stiff]
-    inputs = [*at_vertex, w.f, wp.vec3(*model.gravity), d]
+    inputs = [*at_vertex, w.f, lacking, wp.vec3(*model.gravity), d]
     wp.launch(predict.load, n, inputs=inputs, outputs=[w.r])
     wp.launch(mobility.rigid_response, model.n_body, inputs=[w.r, x, d], outputs=[w.by])
     wp.launch(predict.remove_rigid, n, inputs=[x, d, w.by], outputs=[w.r])

@@ -231,5 +231,6 @@ def test_the_methods_are_what_they_are_called():
     found = [response(method, scene) for method in METHODS]
     assert found[0] == wc.ContactSurface()
     assert found[1].search == "literal"
-    ratios = [penalty.stiffness / found[2].stiffness for penalty in found[2:]]
+    ratios = [penalty.stiffness / found[2].stiffness for penalty in found[2:-1]]
     np.testing.assert_allclose(ratios, [1.0, 10.0, 100.0, 1e3, 1e4])
+    assert found[-1] == found[0]  # with implicit steps

@@ -88,19 +88,19 @@ def momenta(
 
 
 @wp.kernel
-def unresolved(
+def difference(
     # in
     d: Implicit,
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
-    resolved: wp.array[wp.vec3],  # (n_vert,) [m/s] G (M v - A v_c)
+    other: wp.array[wp.vec3],  # (n_vert,) [m/s]
     # out
     u: wp.array[wp.vec3],  # (n_vert,) [m/s]
 ):
-    """One thread per vertex: u."""
+    """One thread per vertex: v - other where a body deforms, else 0."""
     i = wp.tid()
     u[i] = wp.vec3(0.0, 0.0, 0.0)
     if d.inv_mass[i] > 0.0 and deforms(d.vert_body[i], d):
-        u[i] = v[i] - resolved[i]
+        u[i] = v[i] - other[i]
 
 
 @wp.kernel
@@ -184,22 +184,6 @@ def push(
     b = d.vert_body[i]
     if is_pushed(b, d) or (moves(b, d) and floats(b, d)):
         v[i] = v[i] + part * dt[i] * acceleration(i, b, x[i], d)
-
-
-@wp.kernel
-def change(
-    # in
-    d: Implicit,
-    before: wp.array[wp.vec3],  # (n_vert,) [m/s] without contacts
-    v: wp.array[wp.vec3],  # (n_vert,) [m/s]
-    # out
-    y: wp.array[wp.vec3],  # (n_vert,) [m/s]
-):
-    """One thread per vertex: by how much contacts changed the velocity of a body that deforms."""
-    i = wp.tid()
-    y[i] = wp.vec3(0.0, 0.0, 0.0)
-    if d.inv_mass[i] > 0.0 and deforms(d.vert_body[i], d):
-        y[i] = v[i] - before[i]
 
 
 @wp.kernel

@@ -54,7 +54,7 @@ class Inversion:
     def begin(self, state: State) -> None:
         """Begin a frame."""
         if self._implicit:
-            self._before = self._missing(state)
+            self._before = self._missing(self._ratios(state))
             self._times[:] = 0
 
     def held_against(self, rates: np.ndarray, state: State, dt: np.ndarray) -> np.ndarray:
@@ -64,9 +64,10 @@ class Inversion:
         """
         if not self._implicit:
             return rates
-        missing = self._missing(state)
+        ratios = self._ratios(state)
+        missing = self._missing(ratios)
         strained = self._strain_rate(state) * dt > STRAIN
-        now, enough = served(dt), self._frequency_of_flat(state)
+        now, enough = served(dt), self._frequency_of_flat(state, ratios)
         worse = (~(missing <= self._before) & ~(now >= enough)) | strained
         worse &= (self._times < TIMES) | ~np.isfinite(missing)
         kept = np.where(self._times > 0, KEPT * now, 0.0)
@@ -75,22 +76,22 @@ class Inversion:
         slowed = np.where(worse, AGAIN * now, kept)
         return np.stack([np.maximum(rates[0], slowed), rates[1]])
 
-    def _missing(self, state: State) -> np.ndarray:
+    def _missing(self, ratios: np.ndarray) -> np.ndarray:
         """How much of its volume the flat tets lack to be not flat, summed over each world."""
-        return np.bincount(self._of_tet, np.maximum(FLAT - self._ratios(state), 0.0), self._n)
+        return np.bincount(self._of_tet, np.maximum(FLAT - ratios, 0.0), self._n)
 
     def _ratios(self, state: State) -> np.ndarray:
         """Volume of each tet over that at rest, shape (n_tet,)."""
         a, b, c, d = np.moveaxis(state.x.numpy()[self._tets], 1, 0)
         return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / self._volume
 
-    def _frequency_of_flat(self, state: State) -> np.ndarray:
+    def _frequency_of_flat(self, state: State, ratios: np.ndarray) -> np.ndarray:
         """A bound on the frequency of the flat tets of each world [1/s], 0 without, (n_world,).
 
         The largest of single tets with their shares of the masses (Irons and Treharne 1971).
         """
         most = np.zeros(self._n)
-        flat = np.flatnonzero(~(self._ratios(state) >= FLAT))
+        flat = np.flatnonzero(~(ratios >= FLAT))
         if len(flat):
             corners = state.x.numpy()[self._tets]
             k = elements.matrices(self._apart, apply_stiffness, corners)[flat]

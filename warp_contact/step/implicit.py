@@ -32,7 +32,7 @@ def kick(model: Model, state: State, work: Work) -> None:
 def find_lacking(model: Model, state: State, work: Work) -> None:
     """Set what the answer of the bodies to the contacts of this step lacked; before the drift."""
     w, n = work.implicit, model.n_vert
-    wp.launch(predict.change, n, inputs=[w.bodies, w.predicted, state.v], outputs=[w.p])
+    wp.launch(predict.difference, n, inputs=[w.bodies, state.v, w.predicted], outputs=[w.p])
     _multiply(model, state.x, w.p, w.ap, w, w.every)
     wp.launch(
         predict.lack, model.n_body, inputs=[w.bodies, w.total, w.ap], outputs=[work.warm.lacking]
@@ -113,7 +113,7 @@ def _find_load(model: Model, state: State, w: ImplicitWork, lacking: wp.array) -
         of_fixed = w.ap
     wp.launch(predict.momenta, n, inputs=[d, v, of_fixed], outputs=[w.r])
     answer(model, w.r, w.z, w)
-    wp.launch(predict.unresolved, n, inputs=[d, v, w.z], outputs=[w.p])
+    wp.launch(predict.difference, n, inputs=[d, v, w.z], outputs=[w.p])
     apply_stiffness(model, x, w.p, w.stiff)
     at_vertex = [model.vt_start, model.vt_corner, w.stiff]
     inputs = [*at_vertex, w.f, lacking, wp.vec3(*model.gravity), d]

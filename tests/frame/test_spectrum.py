@@ -189,8 +189,8 @@ def test_rates_that_are_kept_are_right_to_some_percent(blob, build_model):
         y = wp.array(x * [1.0, 1.0, part], dtype=wp.vec3)
         found = rates_of(spectrum, y)
         fresh = Spectrum(model)
-        # 0.4 % too low at worst in ten draws of 250 looks; 40 % with a change of a tenth.
-        assert found[0] > 0.97 * fresh.omega(y) and found[1] > 0.97 * fresh.damping_rate(y)
+        # 3 % too low at worst in 25 draws of 120 looks; 40 % with a change of a tenth.
+        assert found[0] > 0.94 * fresh.omega(y) and found[1] > 0.94 * fresh.damping_rate(y)
 
 
 @pytest.mark.parametrize("height", [0.06, 0.03, -0.2])

@@ -2,7 +2,7 @@
 
 python=.venv/bin/python
 stamp=.venv/installed-$1
-if ! { pwd; cat pyproject.toml; } | cmp -s - "$stamp"; then
+if ! { pwd; cat pyproject.toml setup.py; } | cmp -s - "$stamp"; then
     if ! "$python" -m pip --version >/dev/null 2>&1; then
         for found in python3.13 python3.12 python3.11 python3 ''; do
             "$found" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && break
@@ -13,5 +13,5 @@ if ! { pwd; cat pyproject.toml; } | cmp -s - "$stamp"; then
     fi
     echo "installing into .venv (0.7 GB at first)"
     "$python" -m pip install --quiet --disable-pip-version-check --editable ".[$1]"
-    { pwd; cat pyproject.toml; } >"$stamp"
+    { pwd; cat pyproject.toml setup.py; } >"$stamp"
 fi

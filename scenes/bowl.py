@@ -17,7 +17,7 @@ from warp_contact.scene.mesh import TetMesh
 from warp_contact.scene.scene import Scene
 from warp_contact.scene.shapes import dish, drum, sphere
 
-DISH = {"radius": 0.5, "depth": 0.4, "thickness": 0.035, "rings": 14}  # [m]
+DISH: dict = {"radius": 0.5, "depth": 0.4, "thickness": 0.035, "rings": 14}  # [m]
 COUNTS = {"melon": 46, "banana": 64, "apple": 111, "lemon": 111}
 LAYERS = ("melon", "round", "banana", "round")  # from below, over and over; round: apple or lemon
 # Radius and half height of the upright cylinder that contains a fruit however it is turned [m].

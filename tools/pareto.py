@@ -98,8 +98,11 @@ def shown(found: list[Point]) -> list[Point]:
 
 def draw(folder: Path, titles: dict[str, str], found: list[Point]) -> None:
     """The picture of all panels, that of four, and that of how times grow."""
-    from chart import picture  # matplotlib: the table needs none
-
+    try:
+        from chart import picture
+    except ImportError:
+        print("no pictures: pip install 'warp_contact[plot]'", file=sys.stderr)
+        return
     there = {p.panel for p in found}
     errors = {name: title for name, title in titles.items() if name not in growth.TASKS}
     if errors:

@@ -7,6 +7,7 @@ import math
 import os
 from numbers import Integral
 from pathlib import Path
+from types import UnionType
 
 import numpy as np
 
@@ -118,7 +119,7 @@ def path(value, name: str) -> Path:
     return Path(value)
 
 
-def instance(value, kind: type, name: str, remedy: str):
+def instance(value, kind: type | UnionType, name: str, remedy: str):
     """A value of a class; what is often given instead is the class itself."""
     if not isinstance(value, kind):
         raise refuse(name, value, remedy)

@@ -95,10 +95,11 @@ class Simulation(BetweenFrames, ContactData):
         self._bodies = Bodies(self.model, self.scene)
         self._integrator = choose(integrator, *of, self.response)
         load_kernels(self.model, self.device, self._integrator.implicit)
-        settings = self.response, self.fps, substeps, max_substeps, sleeping
         x = self.state.x.numpy().astype(np.float64)
         shapes = find_shapes(self.model, x) if self._integrator.implicit else None
-        self._stepper = Stepper(*of, *settings, shapes)
+        self._stepper = Stepper(
+            *of, self.response, self.fps, substeps, max_substeps, sleeping, shapes
+        )
         self._meter = Meter(self.model)
 
     @property

@@ -15,6 +15,6 @@ def warned() -> Iterator[None]:
         yield
 
 
-def say(message, *_) -> None:
+def say(message, category, filename, lineno, file=None, line=None) -> None:
     """Write a warning."""
     print(f"warp-contact: warning: {' '.join(str(message).split())}", file=sys.stderr)

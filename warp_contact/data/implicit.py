@@ -125,7 +125,7 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
     """Allocate for the bodies that take implicit steps; ``set_blocks`` gives the mobilities."""
     n, n_tet = model.n_vert, model.n_tet
     damped = any(e.damped for e in shapes.implicit.elements)
-    names = ("x", "f", "r", "z", "p", "ap", "dv", "y", "impulse", "answer", "before")
+    names = ["x", "f", "r", "z", "p", "ap", "dv", "y", "impulse", "answer", "before"]
     names += "predicted", "total"
     vectors = {k: wp.zeros(n, dtype=wp.vec3) for k in names}
     return ImplicitWork(

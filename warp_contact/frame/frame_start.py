@@ -21,7 +21,7 @@ class FrameStart:
     def keep(self, state: State, work: Work) -> None:
         """Keep what is now; memory is allocated only where buffers have grown."""
         if len(work.warm.edges) != len(self._warm.edges) or self.n_pair != work.capacity.pairs:
-            self.__init__(state, work)
+            FrameStart.__init__(self, state, work)
             return
         wp.copy(self._x, state.x)
         wp.copy(self._v, state.v)

@@ -66,9 +66,9 @@ def find_shapes(model: Model, x: np.ndarray) -> Shapes:
         r = model.rest[own] - np.average(model.rest[own], axis=0, weights=mass[own])
         rest[own] = r
         inertia[b] = _inertia(mass[own], r)
-    wrench = (wp.zeros(model.n_body, dtype=wp.vec3) for _ in range(2))
+    force, torque = (wp.zeros(model.n_body, dtype=wp.vec3) for _ in range(2))
     parts = lumped, *_parts(model, lumped)
-    return Shapes(kind, of_body, placed, first, rest, inertia, *wrench, *parts)
+    return Shapes(kind, of_body, placed, first, rest, inertia, force, torque, *parts)
 
 
 def largest_mobilities(model: Model) -> np.ndarray:

@@ -28,9 +28,9 @@ from warp_contact.kernels.surface import closure, coupled_closure, residual
 
 # What a frame of any scene uses. The search for overlaps at the start, other responses, sleeping
 # and measuring are left out: many scenes do not need them.
-ALWAYS = (scan, worlds, bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure)
-ALWAYS += (constraint, impulse, pair_impulses, warm_start, residual)
-ALWAYS += (contact_graph, crossing, depth, persistent, vertex_contact, vertices)
+ALWAYS = [scan, worlds, bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure]
+ALWAYS += [constraint, impulse, pair_impulses, warm_start, residual]
+ALWAYS += [contact_graph, crossing, depth, persistent, vertex_contact, vertices]
 IMPLICIT = (advance, bodies, masses, mobility, predict, solve, coupled, coupled_closure, rows)
 
 

@@ -11,6 +11,7 @@ from warp_contact.frame.diagnosis import flattest_tet
 from warp_contact.frame.implicit_shapes import largest_mobilities
 from warp_contact.frame.last_frame import LastFrame
 from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.wrench import Wrench
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 
@@ -23,6 +24,8 @@ class StepCount:
         most: steps in a frame that are taken if the user chose none
         wrench: what the user lets act on bodies
     """
+
+    wrench: Wrench
 
     def __init__(
         self,
@@ -76,7 +79,8 @@ class StepCount:
         pushed = self._worlds.most(self.wrench.accelerations()) / self.fps
         omega, speed = self._with_response(omega), self._speed(state) + pushed
         overlaps = (last.overlapping > 0) | self._leaves
-        per_second = step_bounds.steps_per_second(omega, speed, *self._sizes, overlaps)
+        thickness, edge = self._sizes
+        per_second = step_bounds.steps_per_second(omega, speed, thickness, edge, overlaps)
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
         if self._implicit:
             crossing, before = self._crossing(state), np.where(self._mixed, last.n, 0)

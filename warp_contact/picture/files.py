@@ -45,10 +45,10 @@ def animate(pictures: Iterable, path, fps: float = 30.0) -> None:
     try:
         from PIL import Image
     except ImportError as error:
-        raise ImportError("animations need Pillow: pip install warp_contact[render]") from error
+        raise ImportError("animations need Pillow: pip install 'warp_contact[render]'") from error
     images = [Image.open(picture).convert("RGB") for picture in pictures]
     webp = Path(path).suffix == ".webp"
-    options = {"quality": 80, "method": 4} if webp else {}
+    options: dict = {"quality": 80, "method": 4} if webp else {}
     images[0].save(
         path,
         save_all=True,

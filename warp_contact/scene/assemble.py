@@ -1,5 +1,7 @@
 """From a scene to the flat arrays of a Model and a State."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import warp as wp
 
@@ -7,7 +9,7 @@ from warp_contact.data.model import Elements, Model, Solid
 from warp_contact.data.state import State
 from warp_contact.scene import placement
 from warp_contact.scene.materials import Rigid
-from warp_contact.scene.scene import Scene
+from warp_contact.scene.scene import Body, Scene
 
 
 def assemble(scene: Scene) -> tuple[Model, State]:
@@ -53,18 +55,18 @@ def _friction(scene: Scene) -> list[float]:
     return [scene.friction if mu is None else mu for mu in own]
 
 
-def _first(bodies: list, part: str) -> np.ndarray:
+def _first(bodies: Sequence[Body], part: str) -> np.ndarray:
     """Number of the first vertex, tet or surface triangle of each body, closed by their count."""
     return _prefix(len(getattr(body.mesh, part)) for body in bodies)
 
 
-def _joined(bodies: list, part: str) -> np.ndarray:
+def _joined(bodies: Sequence[Body], part: str) -> np.ndarray:
     """Cells of all meshes, over the vertices of all."""
     first = _first(bodies, "vertices")
     return np.concatenate([getattr(b.mesh, part) + i for b, i in zip(bodies, first, strict=False)])
 
 
-def _of_bodies(bodies: list) -> dict:
+def _of_bodies(bodies: Sequence[Body]) -> dict:
     """Ranges, sizes and worlds of the bodies."""
     meshes = [body.mesh for body in bodies]
     vert0 = _first(bodies, "vertices")
@@ -118,7 +120,7 @@ def _density(body) -> float:
     return body.material.density
 
 
-def _of_surface(bodies: list, tris: np.ndarray, n_vert: int) -> dict:
+def _of_surface(bodies: Sequence[Body], tris: np.ndarray, n_vert: int) -> dict:
     """Surface vertices, triangles and edges."""
     vert0, tri0 = _first(bodies, "vertices"), _first(bodies, "surface")
     edges = np.concatenate(
@@ -144,7 +146,7 @@ def _of_surface(bodies: list, tris: np.ndarray, n_vert: int) -> dict:
     }
 
 
-def _neighbours(bodies: list, n_vert: int) -> dict:
+def _neighbours(bodies: Sequence[Body], n_vert: int) -> dict:
     """The vertices that each one is joined to by an edge of a tet, ascending."""
     links = _joined(bodies, "edges")
     ends = np.concatenate([links, links[:, ::-1]])

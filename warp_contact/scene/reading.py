@@ -13,6 +13,7 @@ import math
 import os
 import re
 import sys
+import warnings
 from contextlib import redirect_stderr, redirect_stdout, suppress
 
 VOLUMES = ("tetra", "pyramid", "wedge", "hexahedron")  # and digits: cells that hold tets
@@ -77,6 +78,8 @@ def read_meshio(path: str, _) -> bytes:
 
     if not path.lower().endswith(tuple(meshio.extension_to_filetypes)):
         raise Unfit("its name has no ending that meshio knows, such as .msh, .vtk or .vtu")
+    # NumPy before 2.3 goes on with what it could read.
+    warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
     with suppress(ImportError):  # another version of meshio
         guard_gmsh()
     mesh = meshio.read(path)
@@ -112,7 +115,9 @@ def guard_gmsh() -> None:
     class Guarded:
         """NumPy, with maps for the arrays that readers fill with -1."""
 
-        __getattr__ = staticmethod(lambda name: getattr(np, name))
+        def __getattr__(self, name):
+            return getattr(np, name)
+
         ones = staticmethod(lambda *given, **more: np.ones(*given, **more).view(Map))
         full = staticmethod(lambda *given, **more: np.full(*given, **more).view(Map))
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class Body:
     index: int
     label: str
     mesh: TetMesh
-    material: object
+    material: Any
     x: np.ndarray = field(repr=False)
     v: np.ndarray = field(repr=False)
     fixed: np.ndarray = field(repr=False)
@@ -57,10 +58,10 @@ class Scene:
         """Raises ValueError for a gravity that is not three numbers or a negative friction."""
         self.gravity = gravity
         self.friction = friction
-        self.bodies: list[Body] | tuple[Body, ...] = []
+        self.bodies: list[Body] = []
         self._labels: set[str] = set()
-        self.planes: list[tuple[np.ndarray, float]] | tuple = []
-        self.plane_friction: list[float | None] | tuple = []
+        self.planes: list[tuple[np.ndarray, float]] = []
+        self.plane_friction: list[float | None] = []
 
     def __setattr__(self, name: str, value) -> None:
         """Raises ValueError for a scene that a simulation has taken over, or a wrong value."""
@@ -74,8 +75,8 @@ class Scene:
     def freeze(self) -> None:
         """Let nothing be changed or added from now on: a simulation does not see it."""
         if "_frozen" not in vars(self):
-            self.bodies, self.planes = tuple(self.bodies), tuple(self.planes)
-            self.plane_friction = tuple(self.plane_friction)
+            for name in ("bodies", "planes", "plane_friction"):
+                setattr(self, name, tuple(getattr(self, name)))
             self._frozen = True
 
     def _refuse_if_frozen(self, what: str) -> None:

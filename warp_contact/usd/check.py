@@ -18,6 +18,7 @@ TOPOLOGY = (
     "surfaceFaceVertexIndices",
     "subdivisionScheme",
 )
+VALIDATED = 0, 26, 3  # the first version whose packages have all that its validators load
 DEFAULT = Usd.TimeCode.Default()
 TURN_ERROR = 1e-9  # of a rotation: double precision
 EXTENT_ERROR = 1e-6  # of the largest coordinate: float32 in another order of operations
@@ -45,11 +46,11 @@ def problems(path) -> list[str]:
 
 
 def registered(stage: Usd.Stage) -> list[str]:
-    """The errors of the validators that ship with USD, where this USD has them."""
-    try:
-        from pxr import UsdValidation
-    except ImportError:
+    """The errors of the validators that ship with USD, none where it is older than they need."""
+    if Usd.GetVersion() < VALIDATED:
         return []
+    from pxr import UsdValidation
+
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     errors = UsdValidation.ValidationContext(validators).Validate(stage)
     kind = UsdValidation.ValidationErrorType.Error

@@ -117,7 +117,7 @@ class RunFolder:
     def _is_anything_there(self, beside: Iterable[str], overwrite: bool) -> bool:
         """Whether the run would replace anything; an error unless it may."""
         folder = self.root.parent
-        names = self.root, self.root.with_suffix(".usdc"), folder / TOPOLOGY
+        names = [self.root, self.root.with_suffix(".usdc"), folder / TOPOLOGY]
         names += folder / "manifest.usdc", *(folder / name for name in beside)
         there = [path for path in names if is_there(path)]
         there += frame_files(folder)[:1]

@@ -131,7 +131,8 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
     stage.SetDefaultPrim(world.GetPrim())
     UsdGeom.Scope.Define(stage, "/World/Looks")
     look = contact_look(stage)
-    physics, local = {}, x.copy()
+    physics: dict = {}
+    local = x.copy()
     for part, label in zip(parts, model.labels, strict=True):
         xform = UsdGeom.Xform.Define(stage, part.path)
         Usd.ModelAPI(xform).SetKind(Kind.Tokens.component)

@@ -42,6 +42,10 @@ class UsdWriter:
         notes: those of the frames that were there when it was resumed
     """
 
+    start: int | None
+    end: int | None
+    notes: list[str]
+
     def __init__(
         self,
         path,

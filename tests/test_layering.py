@@ -30,7 +30,9 @@ MAY = {  # room: those that it may import, beside itself
     "contact_data": {"data", "scene", "frame", "measure"},
     "simulation": {"data", "scene", "step", "frame", "measure", "between_frames"}
     | {"contact_data", "errors", "progress", "exclusive", "checks"},
-    "__init__": {"scene", "step", "measure", "usd", "simulation", "errors", "interrupts"},
+    "runs": {"checks", "files", "usd"},
+    "__init__": {"scene", "step", "measure", "usd", "simulation", "errors", "interrupts"}
+    | {"runs"},
     "command": {"__init__", "errors", "files", "interrupts", "progress", "scene", "step"}
     | {"simulation", "usd", "picture", "checks"},
     "__main__": {"command"},

@@ -4,8 +4,9 @@
     python tools/stability.py map [sweep ...] [--out DIR]
 
 ``cases`` prints the outcome of every scene and the level it holds; the exit status is 1 when one
-holds none. ``map`` writes ``map.csv``, a row per cell, and a heat map per sweep (needs the extra
-``plot``); a cell that fails is a result there. The outcomes: tools/trials/outcome.py.
+holds none. ``map`` runs its cells in processes and writes ``map.csv``, a row per cell, and a heat
+map per sweep (needs the extra ``plot``); a cell that fails is a result there. The outcomes:
+tools/trials/outcome.py.
 """
 
 import sys

@@ -4,6 +4,7 @@ from warp_contact import interrupts  # noqa: F401  first, as the others take a s
 from warp_contact.errors import SimulationError
 from warp_contact.measure.contact_data import Contacts, PairForce
 from warp_contact.measure.measure import Measure
+from warp_contact.runs import sweep
 from warp_contact.scene.materials import Corotated, NeoHookean, Rigid, SpringNetwork
 from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.scene import Body, Scene
@@ -35,5 +36,6 @@ __all__ = [
     "cylinder",
     "dish",
     "sphere",
+    "sweep",
 ]
 __version__ = "0.1.0"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from warp_contact.usd.check import problems
 
@@ -94,6 +94,13 @@ def test_the_check_sees(tmp_path, damage, message):
     damage(stage)
     found = problems(stage)
     assert any(message in line for line in found), found
+
+
+@pytest.mark.skipif(Usd.GetVersion() < (0, 26, 3), reason="before that they lack what they load")
+def test_the_validators_of_usd_are_asked(tmp_path):
+    stage = copied(written(tmp_path / "run"))
+    UsdShade.Shader.Get(stage, "/World/Looks/contact/surface").SetShaderId("NoSuchShader")
+    assert any("NoSuchShader" in line for line in problems(stage))
 
 
 def test_the_check_sees_a_lost_or_torn_frame(tmp_path):

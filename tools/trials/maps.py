@@ -1,7 +1,7 @@
 """The maps: a table with a row per cell, and a picture per sweep."""
 
 import csv
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
 
 import matplotlib
@@ -10,49 +10,45 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.colors import ListedColormap
 
-from trials.outcome import OUTCOMES, classify
-from trials.sweeps import SWEEPS, Sweep
-from trials.watch import METHODS, attempt
+import warp_contact as wc
+from trials.outcome import OUTCOMES
+from trials.sweeps import FIGURES, SWEEPS, Sweep, cases, cell
+from trials.watch import METHODS
+from warp_contact.runs import FILE
 
-FIGURES = {  # of a cell: its columns, and the fields of its record
-    "overlap": "overlap",
-    "energy_gained": "gained",
-    "lowest_volume": "lowest",
-    "end_volume": "volume",
-    **{name: name for name in ("tunnelled", "touched", "steps", "time", "asked", "reason")},
-}
 COLUMNS = "sweep", "method", "x_name", "x", "y_name", "y", "outcome", *FIGURES
-CUT = {"most_steps": 6000, "limit": 30.0}  # steps and seconds that a cell may take
 COLOURS = "#dcefdc", "#f6d55c", "#ed8b3b", "#c0392b", "#5b2c6f", "#8d99a6", "#1b1b1b", "#ffffff"
 SHADES = {"cmap": ListedColormap(COLOURS), "vmin": -0.5, "vmax": len(OUTCOMES) - 0.5}
 
 
 def draw(names: list[str], out: Path) -> None:
-    """Run the sweeps, write the table as they go and a picture after each."""
-    out.mkdir(parents=True, exist_ok=True)
+    """Run all cells, in processes; then write the table, and a picture of each sweep.
+
+    Cells that have ended are kept in the folder until all have: a map that was stopped goes on.
+    """
+    cells = [case for name in names for method in METHODS for case in cases(name, method)]
+    found = wc.sweep(cell, cells, out=out)
     with open(out / "map.csv", "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(COLUMNS)
-        for name in names:
-            found = {method: sweep(name, method, table.writerow) for method in METHODS}
-            picture(SWEEPS[name], found, out / f"{name}.png")
+        table = csv.DictWriter(file, COLUMNS)
+        table.writeheader()
+        for case, figures in zip(cells, found, strict=True):
+            s = SWEEPS[case["sweep"]]
+            table.writerow(case | {"x_name": s.x[0], "y_name": s.y[0]} | figures)
+    outcomes = iter([figures["outcome"] for figures in found])
+    for name in names:
+        grids = {method: grid(name, method, outcomes) for method in METHODS}
+        picture(SWEEPS[name], grids, out / f"{name}.png")
+    (out / FILE).unlink()
 
 
-def sweep(name: str, method: str, write) -> list[list[str]]:
-    """The outcomes of all cells of a method, by rows of equal y; ``write`` takes each row."""
-    s, grid = SWEEPS[name], []
-    xs, ys = (axis.tolist() for axis in s.axes())
-    for y in ys:
-        grid.append([])
-        for x in xs:
-            r = attempt(partial(s.build, x, y), method, **CUT)
-            grid[-1].append(classify(r))
-            figures = [getattr(r, field) for field in FIGURES.values()]
-            write((name, method, s.x[0], x, s.y[0], y, classify(r), *figures))
-    outcomes = [o for row in grid for o in row]
-    counts = ", ".join(f"{o} {outcomes.count(o)}" for o in OUTCOMES if o in outcomes)
+def grid(name: str, method: str, outcomes: Iterator[str]) -> list[list[str]]:
+    """The next outcomes, those of a method, by rows of equal y."""
+    xs, ys = SWEEPS[name].axes()
+    rows = [[next(outcomes) for _ in xs] for _ in ys]
+    flat = [o for row in rows for o in row]
+    counts = ", ".join(f"{o} {flat.count(o)}" for o in OUTCOMES if o in flat)
     print(f"{name:8}  {method:14}  {counts}", flush=True)
-    return grid
+    return rows
 
 
 def picture(s: Sweep, found: dict[str, list[list[str]]], path: Path) -> None:

@@ -1,16 +1,27 @@
 """Sweeps of two numbers to the point of failure, on scenes of two small bodies."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 import warp_contact as wc
+from trials.outcome import classify
 from trials.setting import NONE, Setting, body, setting, soft
+from trials.watch import attempt
 
 CELLS = 11  # along each side
 EDGE = 0.1  # of a block [m]
 FRAMES = 60
+FIGURES = {  # of a cell: its columns, and the fields of its record
+    "overlap": "overlap",
+    "energy_gained": "gained",
+    "lowest_volume": "lowest",
+    "end_volume": "volume",
+    **{name: name for name in ("tunnelled", "touched", "steps", "time", "asked", "reason")},
+}
+CUT = {"most_steps": 6000, "limit": 30.0}  # steps and seconds that a cell may take
 Axis = tuple[str, float, float]  # its name with its unit, first and last value: by equal factors
 
 
@@ -100,3 +111,16 @@ SWEEPS = {
         speed_step,
     ),
 }
+
+
+def cases(name: str, method: str) -> Iterator[dict]:
+    """The cells of a sweep, by rows of equal y."""
+    xs, ys = (axis.tolist() for axis in SWEEPS[name].axes())
+    yield from ({"sweep": name, "method": method, "x": x, "y": y} for y in ys for x in xs)
+
+
+def cell(sweep: str, method: str, x: float, y: float) -> dict:
+    """What becomes of a cell: its outcome and its figures."""
+    r = attempt(partial(SWEEPS[sweep].build, x, y), method, **CUT)
+    figures = {column: getattr(r, field) for column, field in FIGURES.items()}
+    return {"outcome": classify(r)} | figures

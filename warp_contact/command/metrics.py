@@ -27,7 +27,7 @@ def plain(value):
     by b.
     """
     if isinstance(value, dict):
-        pairs = {}
+        pairs: dict = {}
         for (a, b), item in value.items():
             pairs.setdefault(a, {})[b] = plain(item)
         return pairs

@@ -8,14 +8,13 @@ given the same coefficient of damping (what each makes of it stands in ``tools/e
 judged by its positions alone. Contact detection is inside the time; compiling, loading and the
 first frame are outside and stand in a column of their own. An engine that is not installed under
 ``--python`` is in the table with that reason. Writes pareto.csv, the pictures pareto.png with all
-panels, summary.png with four of them and growth.png (``chart/growth.py``), and pareto.txt.
-``--draw`` measures nothing: it draws the pictures of a table again, beside it.
+panels, summary.png with four of them and growth.png (``chart/growth.py``), and pareto.txt; what was
+stopped goes on where it was. ``--draw`` measures nothing: it draws the pictures of a table again.
 """
 
 import sys
 from pathlib import Path
 from statistics import median
-from time import perf_counter
 
 from chart import closed_forms, growth, points, scenes
 from chart.panel import Panel
@@ -26,10 +25,13 @@ from engines.task import Failed, Motion, Task
 from measure import machine
 from measure.run import command_line, count, one_of
 
+import warp_contact as wc
+from warp_contact.runs import FILE
+
 TASKS = closed_forms.TASKS | {name: scenes.scene(name) for name in scenes.TITLES} | growth.TASKS
 LIMIT = 12.0  # CPU s of one run
 PENALTIES = "penalty", "virtual"
-HEAD = """Error against CPU time, {} run(s) of each, {:.0f} s in all.
+HEAD = """Error against CPU time, {} run(s) of each.
 {}; outside: {}.
 Times are of the CPU, so that other work on the machine counts little; each engine uses one thread.
 Kernels are compiled and the first frame is stepped before the clock starts. Failures are behind \
@@ -50,22 +52,26 @@ def main() -> int:
     if args.draw:
         draw(args.draw.parent, titles, shown(points.read(args.draw)))
         return 0
-    begin, rounds, outside = perf_counter(), [], versions(args.python)
-    for _ in range(args.repeats):
-        rounds.append([])
-        for name, (task, panels) in chosen.items():
-            for run in runs(task, *growth.WHO.get(name, (ours.ALL, SWEEPS)), args.python, LIMIT):
-                rounds[-1] += judge(task, panels, *run)
-        # After every round: a long run leaves what it has.
-        found = [middle(same) for same in zip(*rounds, strict=True)]
-        head = HEAD.format(len(rounds), perf_counter() - begin, machine.line("cpu"), outside)
-        args.out.mkdir(parents=True, exist_ok=True)
-        points.write(args.out / "pareto.csv", found)
-        text = points.report(head, titles, shown(found))
-        (args.out / "pareto.txt").write_text(text, encoding="utf-8")
-        print(text)
-        draw(args.out, titles, shown(found))
+    repeats = range(args.repeats)
+    cases = [{"name": n, "repeat": k, "python": args.python} for n in chosen for k in repeats]
+    rows = wc.sweep(measured, cases, 1, out=args.out)  # one process: others would share its caches
+    rounds = [[Point(*row) for part in rows[k :: args.repeats] for row in part] for k in repeats]
+    found = [middle(same) for same in zip(*rounds, strict=True)]
+    head = HEAD.format(args.repeats, machine.line("cpu"), versions(args.python))
+    points.write(args.out / "pareto.csv", found)
+    text = points.report(head, titles, shown(found))
+    (args.out / "pareto.txt").write_text(text, encoding="utf-8")
+    print(text)
+    draw(args.out, titles, shown(found))
+    (args.out / FILE).unlink()
     return 0
+
+
+def measured(name: str, repeat: int, python: str) -> list[list]:
+    """All points of a task; ``repeat`` tells one time from another."""
+    task, panels = TASKS[name]
+    each = runs(task, *growth.WHO.get(name, (ours.ALL, SWEEPS)), python, LIMIT)
+    return [list(point) for run in each for point in judge(task, panels, *run)]
 
 
 def judge(task: Task, panels: list[Panel], method: str, setting: str, motion: Motion):

@@ -94,6 +94,8 @@ def outside(
     reason = done.stderr.decode().strip().rpartition("\n")[2] or f"exit code {done.returncode}"
     if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
         reason = "too slow: the process was stopped"
+    if reason.startswith("ModuleNotFoundError"):
+        reason += ": pip install 'warp_contact[peers]'"
     results = io.BytesIO(done.stdout)
     for _ in settings:
         try:

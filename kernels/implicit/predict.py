@@ -30,7 +30,6 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-SMALL = wp.constant(0.2)  # of the impulses: what their answer may lack
 DAMPED = wp.constant(1.0)  # T: how much of what is not resolved is damped
 
 
@@ -110,7 +109,7 @@ def load(
     vt_corner: wp.array[int],  # (4 n_tet,)
     stiff: wp.array[wp.vec3],  # (4 n_tet,) corners of K u [N/s]
     f: wp.array[wp.vec3],  # (n_vert,) [N]
-    lacking: wp.array[wp.vec3],  # (n_vert,) [N s] see lack
+    lacking: wp.array[wp.vec3],  # (n_vert,) [N] see settle.py
     gravity: wp.vec3,  # [m/s^2]
     d: Implicit,
     # out
@@ -122,7 +121,7 @@ def load(
     r[i] = wp.vec3(0.0, 0.0, 0.0)
     if d.inv_mass[i] > 0.0 and deforms(b, d):
         h = d.h[b]
-        s = h * f[i] - DAMPED * h * h * corner_sum(i, vt_start, vt_corner, stiff) + lacking[i]
+        s = h * f[i] - DAMPED * h * h * corner_sum(i, vt_start, vt_corner, stiff) + h * lacking[i]
         if d.kind[b] == HELD:
             s += h * d.mass[i] * gravity
         r[i] = s
@@ -184,35 +183,3 @@ def push(
     b = d.vert_body[i]
     if is_pushed(b, d) or (moves(b, d) and floats(b, d)):
         v[i] = v[i] + part * dt[i] * acceleration(i, b, x[i], d)
-
-
-@wp.kernel
-def lack(
-    # in
-    d: Implicit,
-    p: wp.array[wp.vec3],  # (n_vert,) [N s] of the contacts of this step
-    ay: wp.array[wp.vec3],  # (n_vert,) [N s] A y
-    # out
-    lacking: wp.array[wp.vec3],  # (n_vert,) [N s]
-):
-    """One thread per body that deforms: p - A y, which the next step makes up for.
-
-    Contacts answer by the stiffness at rest. Without this a body that is strained would rest where
-    A0^-1 p, and not A(x)^-1 p, balances the forces. Nothing where it is not small against p: in a
-    body that is crushed it would come too late, in a stiff one it is rounding.
-    """
-    b = wp.tid()
-    if not deforms(b, d):
-        return
-    given = wp.float64(0.0)
-    left = wp.float64(0.0)
-    for i in range(d.body_vert[b], d.body_vert[b + 1]):
-        s = wp.vec3(0.0, 0.0, 0.0)
-        if d.inv_mass[i] > 0.0:
-            s = p[i] - ay[i]
-            given += wp.float64(wp.length_sq(p[i]))
-        left += wp.float64(wp.length_sq(s))
-        lacking[i] = s
-    if left > wp.float64(SMALL * SMALL) * given:
-        for i in range(d.body_vert[b], d.body_vert[b + 1]):
-            lacking[i] = wp.vec3(0.0, 0.0, 0.0)

@@ -16,6 +16,7 @@ from warp_contact.kernels.implicit.bodies import (
     Solids,
     mat3x12,
 )
+from warp_contact.kernels.implicit.settle import Settling
 from warp_contact.kernels.implicit.solve import Iteration
 from warp_contact.kernels.impulse.rows import Shares, Touched
 from warp_contact.kernels.mobility import Mobility
@@ -82,6 +83,8 @@ class ImplicitWork:
         drift: how bodies turn in a step
         iteration: where the iterations are
         running: bodies that still iterate, shape (1,)
+        settling: where the passes are by which strained bodies answer
+        unsettled: bodies that need another of these, shape (1,)
         none, every: empty arrays
     """
 
@@ -117,6 +120,8 @@ class ImplicitWork:
     drift: Drift
     iteration: Iteration
     running: wp.array[int]
+    settling: Settling
+    unsettled: wp.array[int]
     none: wp.array[wp.vec3]
     every: wp.array[int]
 
@@ -148,6 +153,8 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
         drift=_drift(model.n_body, any(model.solids)),
         iteration=_iteration(model.n_body),
         running=wp.zeros(1, dtype=int),
+        settling=_settling(model.n_body),
+        unsettled=wp.zeros(1, dtype=int),
         none=wp.zeros(0, dtype=wp.vec3),
         every=wp.zeros(0, dtype=int),
         **vectors,
@@ -246,6 +253,12 @@ def _iteration(n_body: int) -> Iteration:
     it.going = wp.zeros(n_body, dtype=int)
     it.enough, it.now = (wp.zeros(n_body, dtype=wp.float64) for _ in range(2))
     return it
+
+
+def _settling(n_body: int) -> Settling:
+    to = Settling()
+    to.left, to.passes = wp.zeros(n_body, dtype=float), wp.zeros(1, dtype=int)
+    return to
 
 
 def _soft(model: Model, shapes: Shapes) -> Mobility:

@@ -21,7 +21,7 @@ class WarmStart:
         kept: tangential and normal impulse of that contact [N s], shape (n_vert,)
         n_edge: contacts of edges in the last step, shape (1,)
         edges: these, with their impulses, sorted by edge and body, shape (capacity.contacts,)
-        lacking: what the answer of implicit bodies to the contacts of the last step lacked [N s],
+        lacking: what the answer of implicit bodies to the contacts of the last step lacked [N],
             shape (n_vert,), or (0,) without such bodies
     """
 

@@ -21,22 +21,31 @@ def kick(model: Model, state: State, work: Work) -> None:
     find_mobility(model, state.x, w)
     _find_forces(model, state, work)
     _find_load(model, state, w, work.warm.lacking)
-    _conjugate_gradients(model, state.x, work)
-    _rigid_part(model, w.dv, state.x, w)
+    solve_present(model, state.x, work)
     inputs = [state.x, w.dv, wp.vec3(*model.gravity), work.dt, w.bodies, w.of]
     wp.launch(predict.kick, model.n_vert, inputs=inputs, outputs=[state.v])
     wp.copy(w.predicted, state.v)
     w.total.zero_()
 
 
-def find_lacking(model: Model, state: State, work: Work) -> None:
-    """Set what the answer of the bodies to the contacts of this step lacked; before the drift."""
-    w, n = work.implicit, model.n_vert
-    wp.launch(predict.difference, n, inputs=[w.bodies, state.v, w.predicted], outputs=[w.p])
+def multiply_change(model: Model, state: State, w: ImplicitWork) -> None:
+    """Set ``ap`` = A y, where y is what the contacts changed of ``state.v`` in this step."""
+    inputs = [w.bodies, state.v, w.predicted]
+    wp.launch(predict.difference, model.n_vert, inputs=inputs, outputs=[w.p])
     _multiply(model, state.x, w.p, w.ap, w, w.every)
-    wp.launch(
-        predict.lack, model.n_body, inputs=[w.bodies, w.total, w.ap], outputs=[work.warm.lacking]
-    )
+
+
+def solve_present(model: Model, x: wp.array, work: Work) -> None:
+    """Set ``dv`` = A^-1 ``r``, and ``of`` to its rigid part; ``r`` becomes what is left of it."""
+    w = work.implicit
+    w.dv.zero_()
+    w.running.zero_()
+    answer(model, w.r, w.z, w)
+    inputs = [w.r, w.z, w.bodies, x]
+    outputs = [w.iteration, w.p, w.running]
+    wp.launch(solve.begin, model.n_body, inputs=inputs, outputs=outputs)
+    while_any(w.running, _iterate, model, x, w)
+    _rigid_part(model, w.dv, x, w)
 
 
 def push(model: Model, state: State, work: Work, part: float) -> None:
@@ -120,18 +129,6 @@ def _find_load(model: Model, state: State, w: ImplicitWork, lacking: wp.array) -
     wp.launch(predict.load, n, inputs=inputs, outputs=[w.r])
     wp.launch(mobility.rigid_response, model.n_body, inputs=[w.r, x, d], outputs=[w.by])
     wp.launch(predict.remove_rigid, n, inputs=[x, d, w.by], outputs=[w.r])
-
-
-def _conjugate_gradients(model: Model, x: wp.array, work: Work) -> None:
-    """Set ``dv`` from the right-hand side ``r``, which becomes what is left of it."""
-    w = work.implicit
-    w.dv.zero_()
-    w.running.zero_()
-    answer(model, w.r, w.z, w)
-    inputs = [w.r, w.z, w.bodies, x]
-    outputs = [w.iteration, w.p, w.running]
-    wp.launch(solve.begin, model.n_body, inputs=inputs, outputs=outputs)
-    while_any(w.running, _iterate, model, x, w)
 
 
 def _iterate(model: Model, x: wp.array, w: ImplicitWork) -> None:

@@ -57,7 +57,6 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
 def finish(model: Model, state: State, work: Work) -> None:
     """Move ``state.x`` by ``state.v``, to the end of the step."""
     if work.implicit:
-        implicit.find_lacking(work.implicit.deforming, state, work)
         return implicit.drift(model, state, work, state.x, turned=True)
     drift(model, state, work, state.x)
 

@@ -13,6 +13,7 @@ from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.step import broad_phase, impulse, narrow_phase, surface
 from warp_contact.step.motion import drift, finish, finish_free, predict
+from warp_contact.step.settle import settle
 
 
 def step(model: Model, state: State, work: Work, damping_stages: int, iterations: int) -> None:
@@ -33,6 +34,8 @@ def in_contact(model: Model, state: State, work: Work, iterations: int) -> None:
     narrow_phase.find_vertices(model, state.x, work.x, work)  # 3, 4
     narrow_phase.continue_edges(model, state.x, work)
     impulse.solve(model, state, work)  # 5
+    if work.implicit:
+        settle(model, state, work)
     # The impulses may have led other edges across each other. If these were left to the closure,
     # they would keep approaching, and its displacements would add energy.
     drift(model, state, work, work.x)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 import warp_contact as wc
 from warp_contact.frame import implicit_shapes
@@ -159,3 +160,26 @@ def test_a_fixed_rigid_body_needs_no_implicit_steps():
     for _ in sim.frames(10):
         pass
     assert sim.measure().overlap < 1e-5
+
+
+def test_rigid_bodies_alone_launch_nothing_for_bodies_that_deform(monkeypatch):
+    """Elastic forces, conjugate gradients, answers of strained bodies."""
+    launched, launch = set(), wp.launch
+
+    def note(kernel, *args, **given):
+        launched.add(kernel.module.name.split("kernels.")[-1])
+        return launch(kernel, *args, **given)
+
+    monkeypatch.setattr(wp, "launch", note)
+    needless = {"elastic.neo_hookean", "implicit.solve", "implicit.predict", "implicit.settle"}
+    for material, some in (
+        (wc.Rigid(1e3), {"implicit.predict"}),
+        (wc.NeoHookean(1e5, 0.3, 1e3), needless),
+    ):
+        launched.clear()
+        scene = wc.Scene()
+        scene.add_plane((0.0, 0.0, 1.0))
+        scene.add_body(wc.box(0.1, 2), material, (0.0, 0.0, 0.0501))
+        wc.Simulation(scene, integrator="implicit").step_frame()
+        assert "impulse.coupled" in launched
+        assert needless & launched == some

@@ -63,6 +63,7 @@ class ImplicitWork:
         deforming: the model with their tets alone
         lumped: that of bodies that take explicit steps beside them; None where none does
         x: positions at which the mobilities are [m], shape (n_vert,)
+        any_deforming: whether some of them deform; else none of the stages for these run
         any_held: whether some of them have fixed vertices
         soft: the mobilities of vertices that are not of rigid bodies
         gradient: deformation gradient times volume of each tet [m^3], shape (n_tet,)
@@ -92,6 +93,7 @@ class ImplicitWork:
     deforming: Model
     lumped: Model | None
     x: wp.array[wp.vec3]
+    any_deforming: bool
     any_held: bool
     soft: Mobility
     gradient: wp.array[wp.mat33]
@@ -137,6 +139,7 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
         bodies=_bodies(model, shapes, awake),
         deforming=shapes.implicit,
         lumped=shapes.explicit if shapes.lumped.any() else None,
+        any_deforming=bool((shapes.of_body >= 0).any()),
         any_held=bool((shapes.kind == int(HELD)).any()),
         soft=_soft(model, shapes),
         gradient=wp.zeros(n_tet, dtype=wp.mat33),

@@ -18,10 +18,14 @@ from warp_contact.step.forces import apply_damping, apply_stiffness, internal_fo
 def kick(model: Model, state: State, work: Work) -> None:
     """Let forces, weight and damping act on ``state.v`` for ``work.dt``, a step or part of one."""
     w = work.implicit
-    find_mobility(model, state.x, w)
-    _find_forces(model, state, work)
-    _find_load(model, state, w, work.warm.lacking)
-    solve_present(model, state.x, work)
+    if w.any_deforming:
+        find_mobility(model, state.x, w)
+        _find_forces(model, state, work)
+        _find_load(model, state, w, work.warm.lacking)
+        solve_present(model, state.x, work)
+    else:
+        place(model, state.x, w)
+        _rigid_part(model, w.dv, state.x, w)  # of nothing
     inputs = [state.x, w.dv, wp.vec3(*model.gravity), work.dt, w.bodies, w.of]
     wp.launch(predict.kick, model.n_vert, inputs=inputs, outputs=[state.v])
     wp.copy(w.predicted, state.v)

@@ -34,7 +34,7 @@ def in_contact(model: Model, state: State, work: Work, iterations: int) -> None:
     narrow_phase.find_vertices(model, state.x, work.x, work)  # 3, 4
     narrow_phase.continue_edges(model, state.x, work)
     impulse.solve(model, state, work)  # 5
-    if work.implicit:
+    if work.implicit and work.implicit.any_deforming:
         settle(model, state, work)
     # The impulses may have led other edges across each other. If these were left to the closure,
     # they would keep approaching, and its displacements would add energy.

@@ -6,9 +6,11 @@ from warp_contact import checks
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.exclusive import exclusively
+from warp_contact.frame.moves import Moves
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure.measure import Meter
-from warp_contact.scene.pose import centre_of, pose_of, rigid_motion_of
+from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.pose import centre_of, frame_of, pose_of, rigid_motion_of
 from warp_contact.scene.scene import Body, Scene, rotation_matrix
 from warp_contact.scene.selection import Bodies
 from warp_contact.scene.topology import HUGE
@@ -24,6 +26,7 @@ class BetweenFrames:
     _bodies: Bodies
     _stepper: Stepper
     _meter: Meter
+    _moves: Moves
 
     def positions(self, body: Body | int | str | None = None) -> np.ndarray:
         """Copy of the positions [m] of one body or of all, shape (n, 3)."""
@@ -39,7 +42,8 @@ class BetweenFrames:
         """Put vertices elsewhere between frames, as at the start of an episode.
 
         This is no motion: nothing on the way is touched or counted, and velocities stay. Overlaps
-        at the new place are moved apart like those at the start of a run. All bodies wake.
+        at the new place are moved apart like those at the start of a run. All bodies wake. What
+        was on its way by ``move_to`` stands still.
 
         Args:
             body: the body; None for all
@@ -57,12 +61,15 @@ class BetweenFrames:
         self._bodies.refuse_bent(x, body)
         with exclusively(self.device):
             self._meter.tunnelling.follow(self.state.x)
+            self._moves.end(self._at(body, chosen), self.state)
             self._stepper.set_positions(x, self._bodies.range(body))
             own = self.model.vert_body.numpy()[self._bodies.range(body)]
             self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
 
     def set_velocity(self, body: Body | int | str, velocity, vertices=None) -> None:
         """Set velocities [m/s] between frames; fixed vertices keep theirs from then on.
+
+        It ends what ``move_to`` began.
 
         Args:
             body: the body
@@ -76,16 +83,56 @@ class BetweenFrames:
         part, chosen = self._bodies.choose(v, body, vertices)
         of = f"velocity of body '{self._bodies.label(body)}'"
         part[chosen] = checks.vectors(velocity, len(chosen), of, checks.FASTEST)
-        at = self._bodies.range(body).start + chosen
+        at = self._at(body, chosen)
         with exclusively(self.device):
+            self._moves.end(at, self.state)
             self._stepper.set_velocities(v[at], at, self._bodies.index(body))
+
+    def move_to(
+        self, body: Body | int | str, positions=None, vertices=None, over: int = 1, *, pose=None
+    ) -> None:
+        """Let fixed vertices reach a place after ``over`` frames, and stand still there.
+
+        With positions they go straight, at a constant speed. With a pose the frame of the mesh
+        does, and turns at a constant rate the shorter way round; so does a rigid body with both.
+        Within a frame vertices go straight: more than half a radian a frame is refused.
+
+        Args:
+            body: the body
+            positions: where they shall be [m], shape (k, 3)
+            vertices: mask or ids within the body, all fixed; None for all that are
+            over: number of frames
+            pose: position [m] and rotation (x, y, z, w) of the mesh, in place of ``positions``
+
+        Raises:
+            ValueError: there is no such body or vertex, one is not fixed, a number is not finite or
+                of that shape, a turn is too fast, or a rigid body would change its shape
+        """
+        over = checks.count(over, "over")
+        x = self.state.x.numpy().copy()
+        part, chosen = self._bodies.choose_fixed(x, body, vertices)
+        before = part[chosen].astype(np.float64)
+        place = self._bodies.goal_pose(body, pose, positions)
+        mesh = self._mesh(body).vertices[chosen]
+        if place is None:
+            of = f"positions of body '{self._bodies.label(body)}'"
+            part[chosen] = checks.numbers(positions, before.shape, of, HUGE)
+        else:
+            part[chosen] = mesh @ place[1].T + place[0]
+        self._bodies.refuse_far(x, body)
+        self._bodies.refuse_bent(x, body)
+        every = np.ones(len(chosen))
+        if place is None and self._bodies.is_rigid(body):
+            place = frame_of(part[chosen].astype(np.float64), mesh, every)
+        way = place and (mesh, frame_of(before, mesh, every), place)
+        self._moves.begin(self._at(body, chosen), before, part[chosen], over, way)
 
     def pose(self, body: Body | int | str) -> tuple[np.ndarray, np.ndarray]:
         """Position [m] and rotation (x, y, z, w) of a body: x = R vertices + position.
 
         As given to ``add_body`` at the start; the nearest one of a body that has deformed.
         """
-        own, mesh = self._bodies.range(body), self.scene.bodies[self._bodies.index(body)].mesh
+        own, mesh = self._bodies.range(body), self._mesh(body)
         mass = self.model.mass.numpy()[own].astype(np.float64)
         return pose_of(self.positions(body).astype(np.float64), mesh.vertices, mass)
 
@@ -102,7 +149,7 @@ class BetweenFrames:
         Raises:
             ValueError: there is no such body, or they are not finite or of that shape
         """
-        mesh = self.scene.bodies[self._bodies.index(body)].mesh
+        mesh = self._mesh(body)
         moved = checks.numbers(position, (3,), "position", HUGE)
         mass = self.model.mass.numpy()[self._bodies.range(body)].astype(np.float64)
         x0, v0 = self.positions(body), self.velocities(body)
@@ -144,6 +191,19 @@ class BetweenFrames:
                 raise ValueError(f"body '{self._bodies.label(index)}': {error}") from None
             if self._stepper.sleeping:
                 self._stepper.sleeping.wake(index)
+
+    def _wake(self, at: np.ndarray) -> None:
+        """Wake the bodies of vertices ``at``."""
+        if self._stepper.sleeping:
+            for index in np.unique(self.model.vert_body.numpy()[at]).tolist():
+                self._stepper.sleeping.wake(index)
+
+    def _at(self, body: Body | int | str | None, chosen: np.ndarray) -> np.ndarray:
+        """Vertices ``chosen`` of a body, or of all, as the model numbers them."""
+        return (self._bodies.range(body).start or 0) + chosen
+
+    def _mesh(self, body: Body | int | str) -> TetMesh:
+        return self.scene.bodies[self._bodies.index(body)].mesh
 
     def _centre(self, body: Body | int | str, x: np.ndarray) -> np.ndarray:
         """Centre of mass [m] of a body at ``x``, shape (3,)."""

@@ -15,6 +15,7 @@ from warp_contact.frame.implicit_shapes import find_shapes
 from warp_contact.frame.integrator import KINDS as INTEGRATORS
 from warp_contact.frame.integrator import choose
 from warp_contact.frame.load_kernels import load_kernels
+from warp_contact.frame.moves import Moves
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure.measure import Measure, Meter
 from warp_contact.progress import Progress
@@ -100,7 +101,7 @@ class Simulation(BetweenFrames, ContactData):
         self._stepper = Stepper(
             *of, self.response, self.fps, substeps, max_substeps, sleeping, shapes
         )
-        self._meter = Meter(self.model)
+        self._meter, self._moves = Meter(self.model), Moves()
 
     @property
     def substeps(self) -> int:
@@ -157,7 +158,8 @@ class Simulation(BetweenFrames, ContactData):
         Raises:
             SimulationError: as ``frames``
         """
-        with exclusively(self.device):
+        with exclusively(self.device), self._moves.frame(self.state, self.fps) as at:
+            self._wake(at)
             self._stepper.step(self.frame + 1)
         self.frame += 1
 
@@ -173,6 +175,7 @@ class Simulation(BetweenFrames, ContactData):
         if worlds is None:
             with exclusively(self.device):
                 self._stepper.reset()
+                self._moves.clear()
                 self._meter = Meter(self.model)
             self.frame = 0
             return
@@ -203,7 +206,8 @@ class Simulation(BetweenFrames, ContactData):
         with exclusively(self.device):
             values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
             values |= {"frame": np.array(self.frame)} | memory.values_of(self._stepper)
-            values |= {f"meter.{k}": value for k, value in self._meter.tunnelling.memory().items()}
+            of_meter, moves = self._meter.tunnelling.memory(), self._moves.values()
+            values |= checkpoint.ungroup({"meter": of_meter, "moves": moves})
         checkpoint.write(path, self._fingerprint(), values)
 
     def load(self, path: str | os.PathLike) -> None:
@@ -220,6 +224,7 @@ class Simulation(BetweenFrames, ContactData):
             memory.restore(self._stepper, values)
             self._meter = Meter(self.model)
             self._meter.tunnelling.remember(checkpoint.group(values, "meter"))
+            self._moves.restore(checkpoint.group(values, "moves"))
         self.frame = int(values["frame"])
 
     def _fingerprint(self) -> str:

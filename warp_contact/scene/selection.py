@@ -9,6 +9,7 @@ from warp_contact.data.model import Model
 from warp_contact.scene import placement
 from warp_contact.scene.pose import pose_of
 from warp_contact.scene.scene import Body, Scene, rotation_matrix
+from warp_contact.scene.topology import HUGE
 
 SAME = 1e-3  # of the size of a rigid body: how far its vertices may be from its shape
 
@@ -57,16 +58,42 @@ class Bodies:
         every = np.arange(len(part))
         return part, every if vertices is None else checks.vertex_ids(vertices, len(part), name)
 
+    def choose_fixed(self, values: np.ndarray, body, vertices) -> tuple[np.ndarray, np.ndarray]:
+        """The same of fixed vertices alone; None chooses all of these."""
+        fixed = self._scene.bodies[self.index(body)].fixed
+        part, chosen = self.choose(values, body, fixed if vertices is None else vertices)
+        free = chosen[~fixed[chosen]]
+        if len(free) or not len(chosen):
+            wrong = f"vertex {free[0]}" if len(free) else "no vertex"
+            only = "only fixed ones move to a place, set_positions puts others there"
+            is_fixed = "is not" if len(free) else "is"
+            raise ValueError(f"{wrong} of body '{self.label(body)}' {is_fixed} fixed: {only}")
+        return part, chosen
+
+    def is_rigid(self, body) -> bool:
+        """Whether a body keeps its shape."""
+        return self._model.materials[self.index(body)].kernels is None
+
+    def goal_pose(self, body, pose, positions) -> tuple[np.ndarray, np.ndarray] | None:
+        """Translation [m] and rotation matrix of a ``pose``; None where positions are given."""
+        if (pose is None) == (positions is None):
+            raise ValueError(f"body '{self.label(body)}': give positions, or a pose, not both")
+        if pose is None:
+            return None
+        if not isinstance(pose, tuple | list) or len(pose) != 2:
+            raise checks.refuse("pose", pose, "a position [m] and a rotation (x, y, z, w)")
+        return checks.numbers(pose[0], (3,), "position", HUGE), rotation_matrix(pose[1])
+
     def refuse_bent(self, x: np.ndarray, body) -> None:
         """Raise ValueError where a rigid body, or any, would not have its shape."""
         for b in range(self._model.n_body) if body is None else [self.index(body)]:
             mesh, own = self._scene.bodies[b].mesh, x[self.range(b)].astype(np.float64)
-            if self._model.materials[b].kernels is None:
+            if self.is_rigid(b):
                 place, turn = pose_of(own, mesh.vertices, np.ones(len(own)))
                 off = np.abs(own - mesh.vertices @ rotation_matrix(turn).T - place).max()
                 if off > SAME * np.ptp(mesh.vertices, axis=0).max():
                     name = f"body '{self._model.labels[b]}' is rigid"
-                    raise ValueError(f"{name}: positions change its shape; use set_pose")
+                    raise ValueError(f"{name}: positions change its shape; give a pose")
 
     def refuse_far(self, x: np.ndarray, body) -> None:
         """Raise ValueError where one body, or any, is further away than a scene may have it."""

@@ -38,7 +38,7 @@ def test_vertices_go_straight_at_a_constant_speed_and_stand_still_where_they_sho
     start = sim.positions(0)[top_of(sim)]
     goal = start + np.float32(rng.uniform(-0.02, 0.02, start.shape))
     sim.move_to(0, goal, over=7)
-    for k in range(1, 7):
+    for k in range(1, 8):
         sim.step_frame()
         # Each of the steps of a frame rounds a position of 0.2 m.
         np.testing.assert_allclose(
@@ -47,8 +47,8 @@ def test_vertices_go_straight_at_a_constant_speed_and_stand_still_where_they_sho
         speed = (goal - start) * 60 / 7
         np.testing.assert_allclose(sim.velocities(0)[top_of(sim)], speed, atol=2e-5)
     for _ in range(3):
-        sim.step_frame()
         np.testing.assert_array_equal(sim.positions(0)[top_of(sim)], goal)
+        sim.step_frame()
         np.testing.assert_array_equal(sim.velocities(0)[top_of(sim)], 0.0)
 
 

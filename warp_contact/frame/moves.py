@@ -77,24 +77,27 @@ class Moves:
     def frame(self, state: State, fps: float) -> Iterator[np.ndarray]:
         """Let them move during the frame that is stepped within; one that fails changes nothing.
 
-        It yields the vertices that move, shape (k,).
+        Those that are there stand still from the next frame on; till then they have the velocity
+        with which they came. It yields the vertices that move, shape (k,).
         """
         self._join()
         at, before = self._now["at"], None
+        there = (self._now["done"] == self._now["over"])[self._now["move"]]
         try:
             if len(at):
                 before = wp.clone(state.v)
-                _assign(state.v, at, fps * (self._where(1) - state.x.numpy()[at]))
+                speed = fps * (self._where(1) - state.x.numpy()[at])
+                _assign(state.v, at, np.where(there[:, None], 0.0, speed))
             yield at
         except BaseException:
             if before is not None:
                 wp.copy(state.v, before)
             raise
+        self._keep(~there)
         self._now["done"] += 1
-        there = (self._now["done"] == self._now["over"])[self._now["move"]]
-        if there.any():
-            _assign(state.x, at[there], self._now["goal"][there])
-            self.end(at[there], state)
+        reached = (self._now["done"] == self._now["over"])[self._now["move"]]
+        if reached.any():
+            _assign(state.x, self._now["at"][reached], self._now["goal"][reached])
 
     def values(self) -> dict[str, np.ndarray]:
         """What a checkpoint needs."""

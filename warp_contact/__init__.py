@@ -9,6 +9,8 @@ from warp_contact.scene.materials import Corotated, NeoHookean, Rigid, SpringNet
 from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.scene import Body, Scene
 from warp_contact.scene.shapes import box, cylinder, dish, sphere
+from warp_contact.scene.shell import heightfield, shell
+from warp_contact.scene.surface import Surface
 from warp_contact.simulation import Simulation
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce, VirtualSurface
 from warp_contact.usd.writer import UsdWriter
@@ -29,12 +31,15 @@ __all__ = [
     "Simulation",
     "SimulationError",
     "SpringNetwork",
+    "Surface",
     "TetMesh",
     "UsdWriter",
     "VirtualSurface",
     "box",
     "cylinder",
     "dish",
+    "heightfield",
+    "shell",
     "sphere",
     "sweep",
 ]

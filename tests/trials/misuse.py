@@ -25,6 +25,7 @@ OPTIONAL = ("unit=", "welded(", "pressure_scale=", ", substeps=", "layers=", "po
 OPTIONAL += ("executor=", "out=")
 NAMES = {"wc": wc, "np": np, "nan": np.nan, "inf": np.inf, "FOLDER": FOLDER}
 NAMES |= {"mesh": lambda: wc.box(0.1, 2), "sim": lambda: NAMES["_sim"]}
+NAMES |= {"surface": lambda: wc.Surface(NAMES["mesh"]().vertices, NAMES["mesh"]().surface)}
 NAMES |= {"npz": lambda: wc.box(0.1, 2).save(f"{FOLDER}/mesh.npz") or f"{FOLDER}/mesh.npz"}
 NAMES |= {"writer": lambda **given: wc.UsdWriter(anew(), NAMES["_sim"], **given)}
 

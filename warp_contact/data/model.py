@@ -50,7 +50,7 @@ class Model:
         labels: name of each body
         materials: material of each body, as given by the user
         solids: of each body that is rigid and moves freely, None for the others
-        elements: the tets, one entry for each material model in use
+        elements: the tets of bodies that deform by forces, one entry for each material model in use
         gravity: acceleration [m/s^2]
         friction: Coulomb coefficient of each body, then of each plane, shape (n_body + n_plane,)
         n_body: number of bodies

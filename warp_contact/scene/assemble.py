@@ -158,10 +158,13 @@ def _neighbours(bodies: Sequence[Body], n_vert: int) -> dict:
 
 
 def _elements(scene: Scene, tet0: np.ndarray) -> tuple[Elements, ...]:
-    """The tets of the scene by material model, in the order of first use."""
+    """The tets of the scene by material model, in the order of first use.
+
+    Those of a body that is fixed as a whole push nothing: an obstacle may be driven into any shape.
+    """
     groups: dict = {}
     for body in scene.bodies:
-        if body.material.kernels is not None:
+        if body.material.kernels is not None and not body.fixed.all():
             groups.setdefault(body.material.kernels, []).append(body)
     out = []
     for kernels, bodies in groups.items():

@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from warp_contact import checks
-from warp_contact.scene import cells, reading
+from warp_contact.scene import cells, reading, reading_faces
 from warp_contact.scene.topology import MeshError
 
 USD = (".usd", ".usda", ".usdc")
 SURFACES = (".stl", ".obj", ".ply", ".off")
+FACES = "faces", "usd_faces"  # kinds that reading_faces.py knows
 ARRAYS = {"vertices": ("fiu", 3), "tets": ("iu", 4)}  # of an .npz: kinds of numbers, columns
 BYTES = 2**31  # of an array: more vertices or tets are no mesh that a machine simulates
 SECONDS = 10.0, 2.0  # that a reader may take: for any file, and for each MB of it
@@ -32,7 +33,8 @@ FEW_THREADS = {  # each thread of a library reserves memory, on machines of many
 USUAL = 1e-4, 10.0  # size [m] of what is simulated: another one may be in another unit
 FILL = (
     "fill it first, by gmsh, or by fTetWild (pip install pytetwild pyvista): "
-    "pytetwild.tetrahedralize_pv(pyvista.read('{}')).save('filled.vtu')"
+    "pytetwild.tetrahedralize_pv(pyvista.read('{0}')).save('filled.vtu'); "
+    "for an obstacle or a rigid body take a shell: wc.shell(wc.Surface.load('{0}'), thickness)"
 )
 
 
@@ -55,7 +57,7 @@ def load(path, prim: str | None, unit: float | None) -> tuple[np.ndarray, np.nda
         raise MeshError(f"{path}: its vertices are of type {x.dtype}, not numbers")
     x = scale * x.astype(np.float64)
     if len(x) and not known and unit is None:
-        _ask_for_unit(path, x)
+        ask_for_unit(path, x)
     return x, tets
 
 
@@ -86,7 +88,7 @@ def save(path, vertices: np.ndarray, tets: np.ndarray, surface: np.ndarray) -> N
     elif suffix in USD:
         _save_usd(path, vertices, tets, surface)
     else:
-        meshio = _meshio(path)
+        meshio = needed_meshio(path)
         mesh = meshio.Mesh(vertices, [("tetra", tets)])
         try:
             with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
@@ -98,14 +100,15 @@ def save(path, vertices: np.ndarray, tets: np.ndarray, surface: np.ndarray) -> N
 
 
 def in_child(kind: str, path: Path, argument: str = "", size: int | None = None) -> bytes:
-    """What ``reading.py`` finds in a file, within limits of time and memory.
+    """What ``reading.py`` or ``reading_faces.py`` finds in a file, limited in time and memory.
 
     Raises:
         MeshError: it cannot be read, and why
     """
     size = path.stat().st_size if size is None else size
     seconds, memory = SECONDS[0] + SECONDS[1] * size / 1e6, MEMORY[0] + MEMORY[1] * size
-    command = [sys.executable, "-P", reading.__file__, kind, str(path), argument, str(memory)]
+    script = reading_faces if kind in FACES else reading
+    command = [sys.executable, "-P", script.__file__, kind, str(path), argument, str(memory)]
     env = os.environ | FEW_THREADS | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     try:
         done = subprocess.run(
@@ -171,14 +174,14 @@ def _member(archive: zipfile.ZipFile, name: str, kinds: str, columns: int) -> np
 
 
 def _load_usd(path: Path, prim: str | None) -> tuple[np.ndarray, np.ndarray, bool]:
-    found = _arrays(in_child("usd", path, prim or ""))
+    found = arrays_of(in_child("usd", path, prim or ""))
     return found["points"], found["tets"], bool(found["has_unit"])
 
 
 def _load_meshio(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Vertices that volume cells use, and the tets of these."""
-    _meshio(path)
-    found = _arrays(in_child("meshio", path))
+    needed_meshio(path)
+    found = arrays_of(in_child("meshio", path))
     points, others = found.pop("points"), str(found.pop("others"))
     if not found:
         fill = f"; {FILL.format(path.name)}" if re.search("triangle|quad|polygon", others) else ""
@@ -195,12 +198,13 @@ def _load_meshio(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return points[used], tets.reshape(-1, 4)
 
 
-def _arrays(data: bytes) -> dict[str, np.ndarray]:
+def arrays_of(data: bytes) -> dict[str, np.ndarray]:
+    """The arrays in the answer of ``in_child``."""
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         return dict(archive)
 
 
-def _ask_for_unit(path: Path, x: np.ndarray) -> None:
+def ask_for_unit(path: Path, x: np.ndarray) -> None:
     """Warn of a size that is usual in another unit than the metre."""
     size = float((x.max(axis=0) - x.min(axis=0)).max())
     if size < USUAL[0] or USUAL[1] < size < math.inf:
@@ -211,7 +215,8 @@ def _ask_for_unit(path: Path, x: np.ndarray) -> None:
         )
 
 
-def _meshio(path: Path):
+def needed_meshio(path: Path):
+    """Meshio, which a file asks for; raises MeshError where it is not installed."""
     try:
         import meshio
     except ImportError as error:

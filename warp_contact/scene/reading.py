@@ -1,6 +1,6 @@
 """Reads mesh files with the libraries of others, as a program of its own: ``files.py`` starts it.
 
-    python reading.py meshio|usd|stage PATH PRIM BYTES
+    python reading.py meshio|usd|stage PATH ARGUMENT BYTES
 
 Damaged files make such libraries hang, crash or take all memory. Here that can be ended, and the
 process that asked lives on. Nothing of ``warp_contact`` is imported, which would take a second.
@@ -73,16 +73,9 @@ def packed(**arrays) -> bytes:
 
 def read_meshio(path: str, _) -> bytes:
     """``points``, the blocks of volume cells as ``<number>.<name>``, ``others`` in words."""
-    import meshio
     import numpy as np
 
-    if not path.lower().endswith(tuple(meshio.extension_to_filetypes)):
-        raise Unfit("its name has no ending that meshio knows, such as .msh, .vtk or .vtu")
-    # NumPy before 2.3 goes on with what it could read.
-    warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
-    with suppress(ImportError):  # another version of meshio
-        guard_gmsh()
-    mesh = meshio.read(path)
+    mesh = by_meshio(path)
     arrays, others = {"points": np.asarray(mesh.points)}, []
     for k, block in enumerate(mesh.cells):
         if block.type.rstrip("0123456789") in VOLUMES:
@@ -90,6 +83,19 @@ def read_meshio(path: str, _) -> bytes:
         else:
             others.append(f"{len(block.data)} {block.type}")
     return packed(**arrays, others=np.array(", ".join(others)))
+
+
+def by_meshio(path: str):
+    """What meshio finds in a file."""
+    import meshio
+
+    if not path.lower().endswith(tuple(meshio.extension_to_filetypes)):
+        raise Unfit("its name has no ending that meshio knows, such as .msh, .vtk or .vtu")
+    # NumPy before 2.3 goes on with what it could read.
+    warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
+    with suppress(ImportError):  # another version of meshio
+        guard_gmsh()
+    return meshio.read(path)
 
 
 def guard_gmsh() -> None:
@@ -138,7 +144,7 @@ def read_usd(path: str, prim: str) -> bytes:
     found = [p for p in found if not prim or str(p.GetPath()) == prim]
     if not found:
         surfaces = sum(p.IsA(UsdGeom.Mesh) for p in stage.Traverse())
-        beside = f"; of its {surfaces} surface meshes it is not said how to fill them with tets"
+        beside = f"; of its {surfaces} surface meshes wc.Surface.load reads one, for wc.shell"
         raise Unfit(f"holds no TetMesh{f' at {prim}' if prim else ''}{beside if surfaces else ''}")
     time = Usd.TimeCode.EarliestTime()
     tetmesh = UsdGeom.TetMesh(found[0])
@@ -146,18 +152,41 @@ def read_usd(path: str, prim: str) -> bytes:
     tets = np.array(tetmesh.GetTetVertexIndicesAttr().Get(time))
     if points.ndim != 2 or tets.ndim != 2 or not points.size or not tets.size:
         raise Unfit(f"the TetMesh {found[0].GetPath()} has no points or no tets")
-    place = np.array(tetmesh.ComputeLocalToWorldTransform(time))  # acts on row vectors
+    place = placement(tetmesh, time)
+    unit, has_unit = unit_of(stage)
+    with np.errstate(over="ignore", invalid="ignore"):
+        x = upright(stage, unit * (points @ place[:3, :3] + place[3, :3]))
+    return packed(points=x, tets=tets, has_unit=np.array(has_unit))
+
+
+def placement(prim, time):
+    """The matrix from a prim to the world, which acts on row vectors, shape (4, 4)."""
+    import numpy as np
+
+    place = np.array(prim.ComputeLocalToWorldTransform(time))
     if not (place[:, 3] == (0.0, 0.0, 0.0, 1.0)).all() or not np.isfinite(place).all():
-        raise Unfit(f"the transform of {found[0].GetPath()} is not affine and finite")
+        raise Unfit(f"the transform of {prim.GetPath()} is not affine and finite")
+    return place
+
+
+def unit_of(stage) -> tuple[float, bool]:
+    """Metres per unit of a stage, and whether it says so."""
+    from pxr import UsdGeom
+
     has_unit = stage.HasAuthoredMetadata("metersPerUnit")
     unit = UsdGeom.GetStageMetersPerUnit(stage) if has_unit else 1.0
     if not (math.isfinite(unit) and unit > 0.0):
         raise Unfit(f"its metersPerUnit is {unit}: write a number above zero into it")
-    with np.errstate(over="ignore", invalid="ignore"):
-        x = unit * (points @ place[:3, :3] + place[3, :3])
+    return unit, has_unit
+
+
+def upright(stage, x):
+    """Vectors of a stage, shape (..., 3), with z up where it says that y is."""
+    from pxr import UsdGeom
+
     if stage.HasAuthoredMetadata("upAxis") and UsdGeom.GetStageUpAxis(stage) == "Y":
-        x = x[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
-    return packed(points=x, tets=tets, has_unit=np.array(has_unit))
+        return x[..., [0, 2, 1]] * (1.0, -1.0, 1.0)
+    return x
 
 
 def read_stage(path: str, frames: str) -> bytes:

@@ -9,6 +9,7 @@ from warp_contact.exclusive import exclusively
 from warp_contact.frame.moves import Moves
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure.measure import Meter
+from warp_contact.measure.skins import Skins
 from warp_contact.scene.mesh import TetMesh
 from warp_contact.scene.pose import centre_of, frame_of, pose_of, rigid_motion_of
 from warp_contact.scene.scene import Body, Scene, rotation_matrix
@@ -27,6 +28,7 @@ class BetweenFrames:
     _stepper: Stepper
     _meter: Meter
     _moves: Moves
+    _skins: Skins
 
     def positions(self, body: Body | int | str | None = None) -> np.ndarray:
         """Copy of the positions [m] of one body or of all, shape (n, 3)."""
@@ -37,6 +39,22 @@ class BetweenFrames:
         chosen = self._bodies.range(body)
         with exclusively(self.device):
             return self._stepper.velocities()[chosen]
+
+    def rendered(self, body: Body | int | str) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices [m] and unit normals of the render surface of a body, as it lies now.
+
+        Returns:
+            The vertices, shape (n, 3), and normals, (n, 3), or of each corner of each triangle
+            where the surface has these, (f, 3, 3).
+
+        Raises:
+            ValueError: there is no such body, or it has no render surface
+        """
+        index = self._bodies.index(body)
+        if index not in self._skins:
+            raise ValueError(f"body '{self._bodies.label(body)}' was given no render surface")
+        with exclusively(self.device):
+            return self._skins.at(index, self.state.x)
 
     def set_positions(self, body: Body | int | str | None, positions, vertices=None) -> None:
         """Put vertices elsewhere between frames, as at the start of an episode.

@@ -73,6 +73,14 @@ def vectors(value, n: int, name: str, most: float = LARGEST) -> np.ndarray:
     return numbers(value, (n, 3) if array_of(value).ndim == 2 else (3,), name, most)
 
 
+def colors(value, n: int) -> np.ndarray:
+    """Linear red, green, blue from 0 to 1, shape (3,), or (n, 3) for each of ``n``."""
+    result = vectors(value, n, "colors")
+    if not 0.0 <= result.min() <= result.max() <= 1.0:
+        raise refuse("colors", value, "linear red, green and blue from 0 to 1")
+    return result
+
+
 def sight(eye, target, of: str = "") -> tuple[np.ndarray, np.ndarray]:
     """Where a camera stands and what it looks at, in different places, shape (3,) each."""
     eye, target = numbers(eye, (3,), f"{of}eye"), numbers(target, (3,), f"{of}target")

@@ -18,6 +18,7 @@ from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.moves import Moves
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure.measure import Measure, Meter
+from warp_contact.measure.skins import Skins
 from warp_contact.progress import Progress
 from warp_contact.scene.assemble import assemble
 from warp_contact.scene.scene import Scene
@@ -102,6 +103,7 @@ class Simulation(BetweenFrames, ContactData):
             *of, self.response, self.fps, substeps, max_substeps, sleeping, shapes
         )
         self._meter, self._moves = Meter(self.model), Moves()
+        self._skins = Skins(self.scene, self.model)
 
     @property
     def substeps(self) -> int:

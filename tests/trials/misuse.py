@@ -22,7 +22,7 @@ SECONDS = 20  # that a call may take
 FOLDER = tempfile.mkdtemp()
 CALLS = Path(__file__).with_suffix(".txt")
 OPTIONAL = ("unit=", "welded(", "pressure_scale=", ", substeps=", "layers=", "positions(None")
-OPTIONAL += ("executor=", "out=")
+OPTIONAL += ("executor=", "out=", "render=")
 NAMES = {"wc": wc, "np": np, "nan": np.nan, "inf": np.inf, "FOLDER": FOLDER}
 NAMES |= {"mesh": lambda: wc.box(0.1, 2), "sim": lambda: NAMES["_sim"]}
 NAMES |= {"surface": lambda: wc.Surface(NAMES["mesh"]().vertices, NAMES["mesh"]().surface)}

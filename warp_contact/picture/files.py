@@ -18,6 +18,18 @@ def write_png(path, picture: np.ndarray) -> None:
         Image.fromarray(picture).save(path)
 
 
+def read_picture(path) -> np.ndarray | None:
+    """Linear colours of a picture, shape (height, width, 3); None if Pillow cannot read it."""
+    try:
+        from PIL import Image
+
+        with Image.open(path) as image:
+            srgb = np.asarray(image.convert("RGB"), dtype=np.float32) / 255.0
+    except (ImportError, OSError, ValueError):
+        return None
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
 def png(picture: np.ndarray) -> bytes:
     """A PNG file by the standard library alone."""
 

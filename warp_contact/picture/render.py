@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom
 from warp_contact import checks
 from warp_contact.picture.files import write_png
 from warp_contact.picture.raycast import Camera, Renderer
+from warp_contact.picture.textures import vertex_colors
 from warp_contact.usd.prims import FOV, PALETTE, linear
 from warp_contact.usd.reader import (
     frame_numbers,
@@ -106,11 +107,15 @@ def chosen_frames(frames: Iterable[int] | None, every: range) -> list[int]:
 
 @dataclass(frozen=True)
 class Drawing:
-    """The meshes of a stage as one: prims, counts of points, triangles over all points."""
+    """The meshes of a stage as one: prims, counts of points, triangles over all points.
+
+    ``textures`` has the colours of those with a texture, None for the others.
+    """
 
     meshes: tuple[UsdGeom.Mesh, ...]
     sizes: tuple[int, ...]
     tris: np.ndarray
+    textures: tuple[np.ndarray | None, ...]
 
     @classmethod
     def of(cls, stage: Usd.Stage) -> "Drawing":
@@ -134,7 +139,8 @@ class Drawing:
         if not meshes or not sum(map(len, tris)):
             name = stage.GetRootLayer().GetDisplayName()
             raise ValueError(f"nothing to draw: {name} has no visible mesh with faces")
-        return cls(tuple(meshes), tuple(sizes), np.concatenate(tris))
+        textures = tuple(map(vertex_colors, meshes, sizes))
+        return cls(tuple(meshes), tuple(sizes), np.concatenate(tris), textures)
 
     def points(self, frame: float) -> np.ndarray:
         """Positions [m] at a frame, shape (n_vert, 3); raises ValueError where there are none."""
@@ -145,8 +151,10 @@ class Drawing:
         """Linear colours at a frame, shape (n_vert, 3)."""
         result = []
         for k, (mesh, n) in enumerate(zip(self.meshes, self.sizes, strict=True)):
-            color = mesh.GetDisplayColorPrimvar().ComputeFlattened(frame)
-            color = np.asarray(color if color else [linear(PALETTE[k % len(PALETTE)])])
+            color = self.textures[k]
+            if color is None:
+                color = mesh.GetDisplayColorPrimvar().ComputeFlattened(frame)
+                color = np.asarray(color if color else [linear(PALETTE[k % len(PALETTE)])])
             color = np.nan_to_num(np.clip(color, 0.0, 1.0))
             result.append(color if len(color) == n else np.tile(color[:1], (n, 1)))
         return np.concatenate(result)

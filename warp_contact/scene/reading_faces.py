@@ -3,13 +3,15 @@
     python reading_faces.py faces|usd_faces PATH ARGUMENT BYTES
 
 Each gives ``points`` (n, 3) and polygons, one after the other: ``counts`` (f,) of the corners of
-each, ``corners``, their points, and as far as they are there ``uv`` and ``normals`` of corners.
+each, ``corners``, their points, and as far as they are there ``uv`` and ``normals`` of corners,
+linear ``colors`` of all points (3,) or of each (n, 3), and the path of a ``texture``.
 """
 
 import importlib.util
 import io
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 # The package itself is not imported, as there.
@@ -21,6 +23,7 @@ Unfit, packed = reading.Unfit, reading.packed
 FACES = {"triangle": 3, "quad": 4, "polygon": 0}  # corners that count, 0: all
 UV = ("s", "t"), ("u", "v"), ("texture_u", "texture_v")  # names in PLY files
 NORMALS = (("nx", "ny", "nz"),)
+COLORS = "red", "green", "blue"
 
 
 def read_faces(path: str, _) -> bytes:
@@ -47,6 +50,11 @@ def read_faces(path: str, _) -> bytes:
             if inside and all(key in mesh.point_data for key in keys):
                 values = np.stack([mesh.point_data[key] for key in keys], axis=1)
                 arrays[name] = values[corners].astype(float)
+    if all(key in mesh.point_data for key in COLORS):
+        rgb = np.stack([mesh.point_data[key] for key in COLORS], axis=1)
+        whole = rgb.dtype.kind in "iu"
+        rgb = rgb.astype(np.uint8) / 255.0 if whole else np.clip(rgb, 0.0, 1.0)
+        arrays["colors"] = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return packed(**arrays)
 
 
@@ -67,7 +75,7 @@ def read_obj(path: str) -> bytes:
     import numpy as np
 
     found = {"v": [], "vt": [], "vn": []}
-    counts, corners = [], []
+    counts, corners, names, library = [], [], set(), ""
     with open(path, encoding="utf-8", errors="replace") as file:
         text = file.read().replace("\\\n", " ")
     for number, line in enumerate(text.splitlines(), 1):
@@ -75,6 +83,10 @@ def read_obj(path: str) -> bytes:
         try:
             if key in found:
                 found[key].append([float(word) for word in words[: 2 if key == "vt" else 3]])
+            elif key == "mtllib":
+                library = line.split(None, 1)[1].strip()
+            elif key == "usemtl":
+                names.add(" ".join(words))
             elif key == "f":
                 if len(words) < 3:
                     raise ValueError
@@ -96,7 +108,29 @@ def read_obj(path: str) -> bytes:
     for name, key, ids in ("uv", "vt", corners[:, 1]), ("normals", "vn", corners[:, 2]):
         if found[key] and len(ids) and 0 <= ids.min() and ids.max() < len(found[key]):
             arrays[name] = np.array(found[key])[ids]
+    if len(names) == 1 and library:
+        arrays |= look_of(Path(path).parent / library, names.pop())
     return packed(**arrays, others=np.array(""))
+
+
+def look_of(library: Path, name: str) -> dict:
+    """``colors`` and ``texture`` of a material in an MTL file, as far as they are there."""
+    import numpy as np
+
+    look, own = {}, False
+    if not library.is_file():
+        return look
+    for line in library.read_text(encoding="utf-8", errors="replace").splitlines():
+        key, *words = line.split() or [""]
+        if key == "newmtl":
+            own = " ".join(words) == name
+        elif own and key == "Kd":
+            with suppress(ValueError):
+                look["colors"] = np.clip([float(word) for word in words[:3]], 0.0, 1.0)
+        elif own and key == "map_Kd" and words:  # options come before the name
+            picture = line.split(None, 1)[1].strip() if words[0][0] != "-" else words[-1]
+            look["texture"] = np.array(str(library.parent / picture.replace("\\", "/")))
+    return {k: v for k, v in look.items() if k != "colors" or v.shape == (3,)}
 
 
 def read_usd_faces(path: str, argument: str) -> bytes:
@@ -129,7 +163,7 @@ def read_usd_faces(path: str, argument: str) -> bytes:
             frames.append(reading.upright(stage, unit * (points @ place[:3, :3] + place[3, :3])))
     turned = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
     turned ^= bool(np.linalg.det(place[:3, :3]) < 0.0)
-    arrays = corner_values(stage, mesh, first, corners, place)
+    arrays = corner_values(stage, mesh, first, corners, place) | usd_look(mesh, first, len(points))
     arrays |= {"points": np.stack(frames) if fps else frames[0], "counts": counts}
     arrays |= {"corners": corners, "turned": np.array(turned), "has_unit": np.array(has_unit)}
     return packed(**arrays, others=np.array(""))
@@ -157,9 +191,13 @@ def corner_values(stage, mesh, time, corners, place) -> dict:
     import numpy as np
     from pxr import UsdGeom
 
-    api, arrays = UsdGeom.PrimvarsAPI(mesh), {}
-    uv, normals = api.GetPrimvar("st"), api.GetPrimvar("normals")
-    given = {"uv": (uv.ComputeFlattened(time), uv.GetInterpolation())} if uv else {}
+    api, arrays, given = UsdGeom.PrimvarsAPI(mesh), {}, {}
+    found = api.GetPrimvarsWithAuthoredValues()
+    found = [p for p in found if str(p.GetTypeName()).startswith("texCoord2")]
+    found = [p for p in found if p.GetPrimvarName() == "st"] or found
+    for uv in found[:1]:
+        given["uv"] = uv.ComputeFlattened(time), uv.GetInterpolation()
+    normals = api.GetPrimvar("normals")
     if normals:
         given["normals"] = normals.ComputeFlattened(time), normals.GetInterpolation()
     else:
@@ -175,6 +213,29 @@ def corner_values(stage, mesh, time, corners, place) -> dict:
             stage, arrays["normals"] @ np.linalg.inv(place[:3, :3]).T
         )
     return arrays
+
+
+def usd_look(mesh, time, n: int) -> dict:
+    """``colors`` and ``texture`` of a mesh of ``n`` points, as far as it has them."""
+    import numpy as np
+    from pxr import UsdShade
+
+    look, color = {}, mesh.GetDisplayColorPrimvar()
+    values = np.array(color.ComputeFlattened(time) or (), dtype=float)
+    material = UsdShade.MaterialBindingAPI(mesh.GetPrim()).ComputeBoundMaterial()[0]
+    shader = material.ComputeSurfaceSource()[0] if material else None
+    diffuse = shader.GetInput("diffuseColor") if shader else None
+    if diffuse:
+        for source in diffuse.GetValueProducingAttributes():
+            picture = UsdShade.Shader(source.GetPrim())
+            file = picture.GetInput("file") if picture else None
+            if file and file.Get():
+                look["texture"] = np.array(file.Get().resolvedPath)
+            elif not picture and not len(values):
+                values = np.array([diffuse.Get(time) or ()], dtype=float)
+    if values.shape in ((1, 3), (n, 3)) and np.isfinite(values).all():
+        look["colors"] = np.clip(values if len(values) == n else values[0], 0.0, 1.0)
+    return look
 
 
 if __name__ == "__main__":

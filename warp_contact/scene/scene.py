@@ -10,6 +10,7 @@ from warp_contact import checks
 from warp_contact.scene import placement
 from warp_contact.scene.materials import Rigid
 from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.surface import Surface
 from warp_contact.scene.topology import HUGE
 
 PLANE = re.compile(r"plane\d+")  # names of half-spaces in measurements
@@ -29,6 +30,7 @@ class Body:
         fixed: which vertices follow a prescribed velocity, shape (n,), bool
         world: bodies of different worlds never touch
         friction: its Coulomb coefficient, None for that of the scene
+        render: surface to draw in place of that of its tets, in the frame of the mesh, or None
     """
 
     index: int
@@ -40,6 +42,7 @@ class Body:
     fixed: np.ndarray = field(repr=False)
     world: int
     friction: float | None = None
+    render: Surface | None = None
 
 
 class Scene:
@@ -96,6 +99,7 @@ class Scene:
         world: int = 0,
         angular_velocity=(0.0, 0.0, 0.0),
         friction: float | None = None,
+        render: Surface | None = None,
     ) -> Body:
         """Place a copy of a rest shape: x = R vertices + position.
 
@@ -105,28 +109,27 @@ class Scene:
             position: translation [m]
             rotation: quaternion (x, y, z, w), normalised here
             velocity: of all vertices, shape (3,), or of each, shape (n, 3) [m/s]
-            fixed: True, a mask of shape (n,) or vertex ids: these follow their own velocity
-                whatever pushes them; all or none of a rigid body
+            fixed: True, mask (n,) or ids, all of a rigid body: they follow their own velocity
             label: name, unique in the scene and no ``plane<index>``; by default ``body<index>``
             world: bodies of different worlds never touch
             angular_velocity: about the centre of mass, on top of ``velocity`` [rad/s]
             friction: Coulomb coefficient, in place of that of the scene
+            render: surface to draw, in the frame of the mesh, which follows its tets
 
         Raises:
             ValueError: naming the body, for input that cannot be simulated
         """
         label = self._new_label(label)
         try:
-            _check_shape(mesh, material, label)
-            world = checks.count(world, "world", least=0)
-            friction = _coefficient(friction)
+            _check_shape(mesh, material, label, render)
+            world, friction = checks.count(world, "world", least=0), _coefficient(friction)
             x = _placed(mesh.vertices, position, rotation)
             v = _velocities(mesh, material, x, (position, rotation), velocity, angular_velocity)
             mask = _mask(fixed, len(x), isinstance(material, Rigid), angular_velocity)
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None
-        body = Body(len(self.bodies), label, mesh, material, x, v, mask, world, friction)
-        self.bodies.append(body)
+        placed = mesh, material, x, v, mask, world, friction, render
+        self.bodies.append(body := Body(len(self.bodies), label, *placed))
         self._labels.add(label)
         return body
 
@@ -173,8 +176,8 @@ def _unit(vector: np.ndarray, name: str) -> np.ndarray:
     return vector / length
 
 
-def _check_shape(mesh, material, label: str) -> None:
-    """Raises ValueError for what is no mesh or no material, and for a class that was not called."""
+def _check_shape(mesh, material, label: str, render) -> None:
+    """Raises ValueError for what is no mesh, material or render surface, or a class not called."""
     if not isinstance(mesh, TetMesh):
         raise checks.refuse("mesh", mesh, "a TetMesh, such as wc.box(0.1, 2)")
     if isinstance(material, type) or not callable(getattr(material, "check", None)):
@@ -182,6 +185,20 @@ def _check_shape(mesh, material, label: str) -> None:
         raise checks.refuse("material", material, wanted)
     material.check()
     placement.check_shape(mesh, label)
+    if render is not None:
+        _check_render(render, mesh)
+
+
+def _check_render(render, mesh: TetMesh) -> None:
+    """Raises ValueError for what is no surface, or lies elsewhere than its mesh."""
+    checks.instance(render, Surface, "render", "a wc.Surface")
+    x, size = mesh.vertices, float(np.ptp(mesh.vertices, axis=0).max())
+    off = np.maximum(render.vertices - x.max(axis=0), x.min(axis=0) - render.vertices).max()
+    if off > size:
+        raise ValueError(
+            f"its render surface reaches {off:.3g} m away from its mesh of {size:.3g} m: give it "
+            f"in the frame and the unit of the mesh"
+        )
 
 
 def _placed(points: np.ndarray, position, rotation) -> np.ndarray:

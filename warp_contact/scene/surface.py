@@ -1,6 +1,7 @@
 """A surface of triangles, open or closed: what obstacles and pictures are often given as."""
 
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -19,10 +20,12 @@ class Surface:
         triangles: vertex ids, shape (f, 3), int32, read-only
         uv: texture coordinates of each corner of each triangle, shape (f, 3, 2), or None
         normals: unit normals of the same, shape (f, 3, 3), or None
+        texture: path of a picture that ``uv`` refer to, or None
+        colors: linear red, green, blue of all vertices or each, shape (3,) or (n, 3), or None
     """
 
-    def __init__(self, vertices, triangles, uv=None, normals=None):
-        """Check; raises MeshError."""
+    def __init__(self, vertices, triangles, uv=None, normals=None, *, texture=None, colors=None):
+        """Check; raises MeshError, ValueError for colours that are none, OSError for a texture."""
         x, tris = checks.array_of(vertices), checks.array_of(triangles)
         if x.dtype.kind not in "fiu" or x.ndim != 2 or x.shape[1] != 3 or not 0 < len(x) <= MOST:
             what = f"of shape {x.shape} and type {x.dtype}"
@@ -43,6 +46,8 @@ class Surface:
         self.vertices, self.triangles = _frozen(x.astype(float)), _frozen(tris.astype(np.int32))
         self.uv = _of_corners(uv, (len(tris), 3, 2), "uv")
         self.normals = _of_corners(normals, (len(tris), 3, 3), "normals", unit=True)
+        self.texture = None if texture is None else _picture(texture)
+        self.colors = None if colors is None else _frozen(checks.colors(colors, len(x)))
 
     def __repr__(self) -> str:
         """Counts only."""
@@ -141,12 +146,13 @@ class Surface:
         if normals is not None:
             normals = (normals @ np.linalg.inv(matrix))[:, turn]
         uv = None if self.uv is None else self.uv[:, turn]
-        return Surface(self.vertices @ matrix.T + move, self.triangles[:, turn], uv, normals)
+        x, looks = self.vertices @ matrix.T + move, {"texture": self.texture, "colors": self.colors}
+        return Surface(x, self.triangles[:, turn], uv, normals, **looks)
 
     def moved(self, vertices) -> "Surface":
         """The same triangles with other positions of the vertices [m], shape (n, 3)."""
         x = checks.numbers(vertices, self.vertices.shape, "vertices", HUGE)
-        return Surface(x, self.triangles, self.uv)
+        return Surface(x, self.triangles, self.uv, texture=self.texture, colors=self.colors)
 
     @staticmethod
     def load(path, prim: str | None = None, unit: float | None = None) -> "Surface":
@@ -191,6 +197,15 @@ class Surface:
             ValueError: as ``load``; faces or the number of points change
         """
         return surface_files.load_frames(path, prim, unit, checks.positive(fps, "fps"))
+
+
+def _picture(path) -> Path:
+    path, known = checks.path(path, "texture"), surface_files.PICTURES
+    if path.suffix.lower() not in known:
+        raise checks.refuse("texture", path.name, f"a picture, one of {' '.join(known)}")
+    if not path.is_file():
+        raise FileNotFoundError(f"no such texture: {path}")
+    return path
 
 
 def _of_corners(values, shape: tuple, name: str, unit: bool = False) -> np.ndarray | None:

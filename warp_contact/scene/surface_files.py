@@ -1,5 +1,6 @@
 """Surface files: polygons of STL, OBJ, PLY, USD and what meshio knows, as triangles."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,8 @@ import numpy as np
 from warp_contact import checks
 from warp_contact.scene import files
 from warp_contact.scene.topology import MeshError
+
+PICTURES = ".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tga", ".tif", ".tiff", ".exr", ".hdr"
 
 
 def load(path, prim: str | None, unit: float | None) -> dict:
@@ -21,6 +24,14 @@ def load(path, prim: str | None, unit: float | None) -> dict:
         out["uv"] = found["uv"][corners]
     if "normals" in found and np.linalg.norm(found["normals"], axis=1).min() > checks.SMALLEST:
         out["normals"] = found["normals"][corners]  # false too for what is no number
+    if "colors" in found:
+        colors = found["colors"]
+        out["colors"] = colors[kept] if colors.ndim == 2 else colors
+    picture = Path(str(found.get("texture", "")))
+    if picture.suffix.lower() in PICTURES and picture.is_file():
+        out["texture"] = picture
+    elif picture.name:
+        warnings.warn(f"{path}: its texture {picture} is left out: no such picture", stacklevel=3)
     return out
 
 

@@ -27,6 +27,7 @@ from warp_contact.usd.kept import check_frames, check_layers, first_frame
 from warp_contact.usd.motion import motion, motion_types, numbers
 from warp_contact.usd.prims import check_options, heated, parts, topology
 from warp_contact.usd.reader import open_stage
+from warp_contact.usd.skin import add_renders, copy_textures, render_types, render_values, renders
 
 LEVELS = 1000  # distinct values of a scalar in a frame: the crate format packs up to about 1024
 
@@ -85,8 +86,8 @@ class UsdWriter:
         self.folder = _folder(path, overwrite, resume)
         self.sim, self.velocities, self.flatten = sim, velocities, flatten
         self.animate_tets = animate_tets and tets
-        self.start, self.end, self.notes = None, None, []
-        self.parts = parts(sim.model)
+        self.parts, self.start, self.end = parts(sim.model), None, None
+        self.renders, self.notes = renders(self.parts, sim), []
         self.base = np.concatenate([np.tile(p.color, (p.n_vert, 1)) for p in self.parts])
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
         self.grows, self.layer = self.scale == 0.0, self._declare()
@@ -97,6 +98,8 @@ class UsdWriter:
         try:
             if resume:
                 self._check()
+            copy_textures(self.renders, self.folder.now)
+            add_renders(prims, self.renders)
             export(prims, self.folder.now / TOPOLOGY)
             export(self.layer, self.folder.now / "manifest.usdc")
             if resume:
@@ -190,6 +193,8 @@ class UsdWriter:
                 points = Vt.Vec3fArray.FromNumpy(x[slice(*part.verts)])
                 yield f"{part.path}/sim.points", points
                 yield f"{part.path}/sim.extent", UsdGeom.PointBased.ComputeExtent(points)
+        for render in self.renders:
+            yield from render_values(render, self.sim)
 
     def _declare(self) -> Sdf.Layer:
         """A layer that holds every attribute of a frame, without values."""
@@ -210,9 +215,9 @@ class UsdWriter:
             if self.animate_tets and not part.is_rigid:
                 attributes[f"{part.path}/sim.points"] = types.Point3fArray
                 attributes[f"{part.path}/sim.extent"] = types.Float3Array
-            for path, kind in attributes.items():
-                prim, _, name = path.partition(".")
-                Sdf.AttributeSpec(Sdf.CreatePrimInLayer(layer, prim), name, kind)
+            declare(layer, attributes)
+        for render in self.renders:
+            declare(layer, render_types(render))
         return layer
 
     def _write_root(self, start: int, end: int) -> None:
@@ -236,6 +241,13 @@ class UsdWriter:
         world.SetInfo("clips", {"default": clips})
         with replacing(self.folder.now / self.root.name) as part:
             part.write_text(layer.ExportToString(), encoding="utf-8")
+
+
+def declare(layer: Sdf.Layer, attributes: dict) -> None:
+    """Let a layer hold attributes of some types, by their paths."""
+    for path, kind in attributes.items():
+        prim, _, name = path.partition(".")
+        Sdf.AttributeSpec(Sdf.CreatePrimInLayer(layer, prim), name, kind)
 
 
 def export(layer: Sdf.Layer, path: Path) -> None:

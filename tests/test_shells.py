@@ -166,3 +166,27 @@ def test_a_surface_that_changes_its_shape_pushes_and_has_no_energy(tmp_path):
     assert sim.positions(block)[:, 2].min() > 0.02
     # That of the block alone, which was pushed at 0.1 m/s: far more if the bed counted.
     assert sim.measure().elastic < 1e-3
+
+
+def test_a_run_that_was_written_moves_an_obstacle_in_another_one(tmp_path):
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+    scene.add_body(wc.box(0.1, 2), SOFT, velocity=(0.0, 0.0, 0.5))
+    sim = wc.Simulation(scene)
+    with wc.UsdWriter(tmp_path / "first", sim) as usd:
+        usd.write()
+        for _ in sim.frames(10):
+            usd.write()
+
+    surface = wc.Surface.load(tmp_path / "first/first.usda")
+    frames = wc.Surface.load_frames(tmp_path / "first/first.usda", fps=60)
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+    scene.add_body(wc.shell(surface, 0.02, "inside"), SOFT, fixed=True)
+    sim, n = wc.Simulation(scene), len(surface.vertices)
+    for x in frames[1:]:
+        sim.move_to(0, wc.shell(surface.moved(x), 0.02, "inside").vertices)
+        sim.step_frame()
+        # Rounding of positions of 0.1 m, sixty times a second.
+        np.testing.assert_allclose(sim.velocities(0)[n:, 2], 0.5, atol=2e-5)
+    assert len(frames) == 11
+    np.testing.assert_allclose(sim.positions(0)[n:], frames[10], atol=1e-8)
+    assert frames[10][:, 2].mean() == pytest.approx(0.5 * 10 / 60, abs=1e-5)

@@ -175,6 +175,19 @@ def test_the_bowl_repeats_for_a_seed_and_thins_out_by_a_fraction():
     assert not np.array_equal(one.bodies[1].x, bowl.build(fraction=0.1, seed=6).bodies[1].x)
 
 
+def test_fine_fruits_move_as_coarse_ones_and_have_their_volume():
+    coarse, fine = (Simulation(bowl.build(fraction=0.02, fine=f)) for f in (False, True))
+    for sim in coarse, fine:
+        for _ in sim.frames(2):
+            pass
+    np.testing.assert_array_equal(coarse.positions(), fine.positions())
+    for body in fine.scene.bodies[1:]:
+        assert body.render.volume == pytest.approx(body.mesh.volume)
+        sizes = (np.ptp(x, axis=0) for x in (body.render.vertices, body.mesh.vertices))
+        np.testing.assert_allclose(*sizes, rtol=0.2)
+    assert fine.rendered(1)[0].shape == fine.scene.bodies[1].render.vertices.shape
+
+
 @pytest.mark.parametrize("name", scenes.names())
 def test_a_scene_runs_without_overlap_and_without_inverting_a_tet(name):
     scene = bowl.build(fraction=0.1) if name == "bowl" else scenes.load(name).build()

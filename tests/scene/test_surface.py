@@ -27,7 +27,7 @@ def test_what_a_surface_encloses_has_the_volume_and_the_inertia_of_its_tets(rng)
 def test_an_open_surface_or_one_turned_inside_out_encloses_nothing():
     with pytest.raises(wc.MeshError, match="not closed encloses nothing"):
         wc.Surface(MESH.vertices, MESH.surface[1:]).rigid(1000.0)
-    with pytest.raises(wc.MeshError, match="inside out: turn its triangles"):
+    with pytest.raises(wc.MeshError, match="inside out: then turn its triangles"):
         wc.Surface(MESH.vertices, MESH.surface[:, ::-1]).rigid(1000.0)
     with pytest.raises(ValueError, match="density 0: give a number above 0"):
         surface_of(MESH).rigid(0)

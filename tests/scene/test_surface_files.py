@@ -256,3 +256,13 @@ def test_a_unit_is_asked_for(tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n")
     with pytest.warns(UserWarning, match=r"100 m large.*unit=1e-3 reads millimetres"):
         wc.Surface.load(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.usda"])
+def test_who_loads_tets_from_a_surface_is_told_of_shells(name, tmp_path):
+    pytest.importorskip("meshio")
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    usda(tmp_path / "a.usda")
+    with pytest.raises(wc.MeshError, match=r"wc\.Surface\.load") as error:
+        wc.TetMesh.load(tmp_path / name)
+    assert "wc.shell" in str(error.value)

@@ -9,7 +9,7 @@ from warp_contact import checks
 from warp_contact.data.model import Solid
 from warp_contact.scene import pieces, surface_files
 from warp_contact.scene.materials import Rigid
-from warp_contact.scene.topology import HUGE, MOST, MeshError
+from warp_contact.scene.topology import HUGE, MOST, MeshError, signed_volumes
 
 
 class Surface:
@@ -64,9 +64,7 @@ class Surface:
     def is_closed(self) -> bool:
         """Whether every edge has two triangles, which turn the same way."""
         key, back = self._half_edges
-        return bool((np.bincount(np.unique(key, return_inverse=True)[1]) == 1).all()) and bool(
-            np.isin(key, back).all()
-        )
+        return len(np.unique(key)) == len(key) and bool(np.isin(key, back).all())
 
     @property
     def _half_edges(self) -> tuple[np.ndarray, np.ndarray]:
@@ -130,9 +128,9 @@ class Surface:
         x = np.concatenate([self.vertices, self.vertices.mean(axis=0, keepdims=True)])
         apex = np.full((len(self.triangles), 1), len(self.vertices))
         tets = np.concatenate([self.triangles, apex], axis=1)[:, [0, 2, 1, 3]]
+        if signed_volumes(x, tets).sum() <= 0.0:
+            raise MeshError("the surface is flat, or inside out: then turn its triangles round")
         solid: Solid = Rigid(density).solid(x, tets)
-        if solid.mass <= 0.0:
-            raise MeshError("the surface is inside out: turn its triangles round")
         return float(solid.mass), solid.centre, solid.inertia
 
     def transformed(self, matrix, translation=(0.0, 0.0, 0.0)) -> "Surface":
@@ -150,7 +148,7 @@ class Surface:
         return Surface(x, self.triangles[:, turn], uv, normals, **looks)
 
     def moved(self, vertices) -> "Surface":
-        """The same triangles with other positions of the vertices [m], shape (n, 3)."""
+        """The same triangles at other positions [m], shape (n, 3), without normals."""
         x = checks.numbers(vertices, self.vertices.shape, "vertices", HUGE)
         return Surface(x, self.triangles, self.uv, texture=self.texture, colors=self.colors)
 

@@ -150,6 +150,19 @@ def test_a_plate_that_is_moved_frame_by_frame_carries_a_block_at_its_velocity(in
     np.testing.assert_array_equal(sim.positions(plate), start + way)
 
 
+def test_what_sleeps_on_a_plate_is_woken_and_carried_by_it():
+    scene = wc.Scene(friction=0.8)
+    plate = scene.add_body(wc.shell(sheet(1, 0.3), 0.01, "inside"), HELD, fixed=True)
+    dull = wc.NeoHookean(1e5, 0.4, 1000.0, 8e-3)
+    block = scene.add_body(wc.box(0.06, 2), dull, (0.0, 0.0, 0.0301))
+    sim = run(wc.Simulation(scene, sleeping=True), 90)
+    low = sim.positions(block)[:, 2].mean()
+    assert not sim._stepper.work.awake.bodies.numpy().any()
+    sim.move_to(plate, pose=((0.0, 0.0, 0.05), (0.0, 0.0, 0.0, 1.0)), over=30)
+    run(sim, 45)
+    assert sim.positions(block)[:, 2].mean() - low == pytest.approx(0.05, abs=1e-4)
+
+
 def test_a_surface_that_changes_its_shape_pushes_and_has_no_energy(tmp_path):
     surface = sheet(4, 0.3)
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0))

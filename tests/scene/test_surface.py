@@ -48,6 +48,19 @@ def test_a_surface_can_be_placed_and_mirrored(rng):
     assert np.linalg.norm(other.normals, axis=2) == pytest.approx(1.0)
 
 
+def test_cracks_are_closed_by_a_tolerance(rng):
+    soup = MESH.vertices[MESH.surface].reshape(-1, 3)
+    tris, colors = np.arange(len(soup)).reshape(-1, 3), rng.random((len(soup), 3))
+    soup += rng.uniform(-1e-6, 1e-6, soup.shape)
+    cracked = wc.Surface(soup, tris, colors=colors)
+    whole = cracked.welded(1e-5)
+    assert not cracked.is_closed
+    assert whole.is_closed and whole.volume == pytest.approx(MESH.volume, rel=1e-3)
+    assert whole.colors.shape == whole.vertices.shape
+    with pytest.raises(wc.MeshError, match="no triangle is larger than 1 m"):
+        wc.Surface(np.eye(3), [[0, 1, 2]]).transformed(0.1 * np.eye(3)).welded(1.0)
+
+
 def test_a_texture_and_colours_are_checked(tmp_path):
     square = np.eye(3), [[0, 1, 2]]
     with pytest.raises(ValueError, match=r"texture 'a\.txt': give a picture, one of .png"):

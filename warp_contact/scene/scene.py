@@ -179,7 +179,8 @@ def _unit(vector: np.ndarray, name: str) -> np.ndarray:
 def _check_shape(mesh, material, label: str, render) -> None:
     """Raises ValueError for what is no mesh, material or render surface, or a class not called."""
     if not isinstance(mesh, TetMesh):
-        raise checks.refuse("mesh", mesh, "a TetMesh, such as wc.box(0.1, 2)")
+        such = "wc.shell(surface, 0.01)" if isinstance(mesh, Surface) else "wc.box(0.1, 2)"
+        raise checks.refuse("mesh", mesh, f"a TetMesh, such as {such}")
     if isinstance(material, type) or not callable(getattr(material, "check", None)):
         wanted = "a material, such as wc.NeoHookean(1e5, 0.4, 1000.0)"
         raise checks.refuse("material", material, wanted)

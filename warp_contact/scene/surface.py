@@ -152,6 +152,25 @@ class Surface:
         x = checks.numbers(vertices, self.vertices.shape, "vertices", HUGE)
         return Surface(x, self.triangles, self.uv, texture=self.texture, colors=self.colors)
 
+    def welded(self, tolerance: float) -> "Surface":
+        """The same with one vertex for all that are nearer than a tolerance [m].
+
+        It closes the cracks of files whose numbers are rounded. Triangles that become flat go.
+
+        Raises:
+            ValueError: a tolerance that is none; MeshError: no triangle is left
+        """
+        pairs = pieces.coincident(self.vertices, checks.positive(tolerance, "tolerance"))
+        tris = pieces.components(pairs, len(self.vertices))[self.triangles]
+        whole = (tris != np.roll(tris, 1, axis=1)).all(axis=1)
+        if not whole.any():
+            raise MeshError(f"no triangle is larger than {tolerance:g} m: give a smaller tolerance")
+        kept, tris = np.unique(tris[whole], return_inverse=True)
+        uv, normals = (None if of is None else of[whole] for of in (self.uv, self.normals))
+        each = self.colors is not None and self.colors.ndim == 2
+        looks = {"texture": self.texture, "colors": self.colors[kept] if each else self.colors}
+        return Surface(self.vertices[kept], tris.reshape(-1, 3), uv, normals, **looks)
+
     @staticmethod
     def load(path, prim: str | None = None, unit: float | None = None) -> "Surface":
         """Read STL, OBJ, PLY or another format of meshio, or a Mesh of USD.

@@ -176,8 +176,8 @@ class Surface:
         """Read STL, OBJ, PLY or another format of meshio, or a Mesh of USD.
 
         From USD comes the first Mesh or the one at the path ``prim``, as placed in the stage at its
-        earliest time, in metres and with z up where the stage says what it has. Polygons are cut
-        into triangles, vertices in the same place are joined.
+        earliest time, in metres and with z up where the stage says what it has, and unsubdivided.
+        Polygons are cut into triangles, vertices in exactly the same place are joined.
 
         Args:
             path: the file

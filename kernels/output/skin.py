@@ -3,8 +3,8 @@
     p = sum of w_k x_k          the corners x_k of the tet that holds the point at rest        [m]
     n ~ cof(F) n_0              F the deformation gradient of the tet                          [-]
 
-A point that no tet holds belongs to the one from whose faces it sticks out least, and some of its
-w_k are negative.
+A point that no tet holds belongs to that of the nearest triangle of the tets, and some of its w_k
+are negative.
 """
 
 import warp as wp
@@ -14,6 +14,9 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
+ROUNDING = wp.constant(1.0e-5)  # of weights: a point between two tets is in one of them
+FAR = wp.constant(1.0e30)  # [m]
+
 
 @wp.func
 def weights(p: wp.vec3, t: wp.vec4i, pose: wp.mat33, y: wp.array[wp.vec3]) -> wp.vec4:
@@ -21,19 +24,12 @@ def weights(p: wp.vec3, t: wp.vec4i, pose: wp.mat33, y: wp.array[wp.vec3]) -> wp
     return wp.vec4(1.0 - w[0] - w[1] - w[2], w[0], w[1], w[2])
 
 
-@wp.func
-def sticks_out(w: wp.vec4, pose: wp.mat33) -> float:
-    """How far [m] a point of weights w is outside the face from which it is furthest."""
-    a = wp.vec3(pose[0, 0], pose[0, 1], pose[0, 2])
-    b = wp.vec3(pose[1, 0], pose[1, 1], pose[1, 2])
-    c = wp.vec3(pose[2, 0], pose[2, 1], pose[2, 2])
-    out = wp.max(-w[1] / wp.length(a), -w[2] / wp.length(b))
-    return wp.max(wp.max(out, -w[3] / wp.length(c)), -w[0] / wp.length(a + b + c))
-
-
 @wp.kernel
 def find_tets(
     # in
+    boxes: wp.uint64,  # of the tets
+    surface: wp.uint64,  # a mesh of their surface
+    tet_of: wp.array[int],  # (n_tri,) tet of each triangle
     tets: wp.array[wp.vec4i],  # (n_tet,)
     pose: wp.array[wp.mat33],  # (n_tet,) [1/m]
     y: wp.array[wp.vec3],  # (n_vert,) [m] at rest
@@ -42,18 +38,21 @@ def find_tets(
     tet: wp.array[int],  # (n_point,)
     weight: wp.array[wp.vec4],  # (n_point,)
 ):
-    """One thread per point: the tet that holds it."""
+    """One thread per point: its tet."""
     i = wp.tid()
-    least = float(wp.inf)
-    for q in range(tets.shape[0]):
-        w = weights(p[i], tets[q], pose[q], y)
-        out = sticks_out(w, pose[q])
-        if out < least:
-            least = out
+    best = float(-ROUNDING)
+    tet[i] = -1
+    q = int(0)
+    query = wp.bvh_query_aabb(boxes, p[i], p[i])
+    while wp.bvh_query_next(query, q):
+        least = wp.min(weights(p[i], tets[q], pose[q], y))
+        if least > best or (least == best and q < tet[i]):
+            best = least
             tet[i] = q
-            weight[i] = w
-        if out <= 0.0:
-            return
+    if tet[i] < 0:
+        near = wp.mesh_query_point_no_sign(surface, p[i], FAR)
+        tet[i] = tet_of[near.face]
+    weight[i] = weights(p[i], tets[tet[i]], pose[tet[i]], y)
 
 
 @wp.kernel

@@ -47,28 +47,36 @@ def test_a_surface_follows_any_linear_deformation_exactly(normals, rng):
         )
 
 
-def test_a_point_outside_belongs_to_the_tet_from_which_it_sticks_out_least(rng):
-    points = rng.uniform(-0.11, 0.11, (300, 3))
+def distances(p: np.ndarray, a, b, c) -> np.ndarray:
+    """Of points (n, 3) from triangles [m], corners (m, 3) each, shape (n, m)."""
+    n = np.cross(b - a, c - a)
+    above = np.einsum("nmi,mi->nm", p[:, None] - a, n) / np.linalg.norm(n, axis=1)
+    inside, least = np.ones(above.shape, dtype=bool), np.full(above.shape, np.inf)
+    for q, r in (a, b), (b, c), (c, a):
+        way, off = r - q, p[:, None] - q
+        inside &= np.einsum("nmi,mi->nm", off, np.cross(n, way)) >= 0.0
+        s = np.einsum("nmi,mi->nm", off, way) / (way * way).sum(axis=1)
+        off = off - np.clip(s, 0.0, 1.0)[..., None] * way
+        least = np.minimum(least, np.linalg.norm(off, axis=2))
+    return np.where(inside, np.abs(above), least)
+
+
+def test_a_point_outside_belongs_to_the_nearest_tet(rng):
+    points = rng.uniform(-0.13, 0.13, (300, 3))
     sim = with_render(wc.Surface(points, np.arange(300).reshape(-1, 3)))
-    skin = sim._skins._of[1]
+    skin, corner = sim._skins._of[1], COARSE.vertices[COARSE.tets]
     tet, weight = skin.tet.numpy(), skin.weight.numpy()
-    corner = COARSE.vertices[COARSE.tets]
-    out = np.full((300, len(corner)), -np.inf)
-    for k in range(4):  # beyond the face opposite to corner k
-        a, b, c = (corner[:, j] for j in range(4) if j != k)
-        n = np.cross(b - a, c - a)
-        n *= np.sign(np.einsum("qi,qi->q", n, a - corner[:, k]))[:, None]
-        n /= np.linalg.norm(n, axis=1)[:, None]
-        out = np.maximum(out, points @ n.T - np.einsum("qi,qi->q", n, a))
-    inside = (out < -1e-6).any(axis=1)
-    assert 50 < inside.sum() < 300
-    assert (out[np.arange(300), tet][inside] < 1e-6).all()
-    np.testing.assert_allclose(
-        out[np.arange(300), tet][~inside], out.min(axis=1)[~inside], atol=1e-6
-    )
-    held = np.einsum("pk,pki->pi", weight, corner[tet])
-    np.testing.assert_allclose(held, points, atol=1e-6)
-    assert weight[inside].min() > -1e-4
+    np.testing.assert_allclose(np.einsum("pk,pki->pi", weight, corner[tet]), points, atol=1e-6)
+    within = weight.min(axis=1) >= -1e-5
+    assert 50 < within.sum() < 250
+    out, own = points[~within], tet[~within]
+    faces = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]
+    found = np.min([distances(out, *np.moveaxis(corner[:, f], 1, 0)) for f in faces], axis=0)
+    np.testing.assert_allclose(found[np.arange(len(out)), own], found.min(axis=1), atol=1e-7)
+    # Those that are outside are outside all of them.
+    full = np.linalg.inv(np.swapaxes(corner[:, 1:] - corner[:, :1], 1, 2))
+    w = np.einsum("mij,nmj->nmi", full, out[:, None] - corner[:, 0])
+    assert np.minimum(w.min(axis=2), 1.0 - w.sum(axis=2)).max() < 1e-5
 
 
 def test_the_surface_of_a_rigid_body_turns_with_it():

@@ -10,6 +10,7 @@ from warp_contact.kernels.output import skin as kernels
 from warp_contact.scene.mesh import TetMesh
 from warp_contact.scene.scene import Scene
 from warp_contact.scene.surface import Surface
+from warp_contact.scene.topology import FACES
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,12 @@ class Skins:
 def _skin(mesh: TetMesh, surface: Surface) -> Skin:
     corner, n = mesh.vertices[mesh.tets], len(surface.vertices)
     pose = wp.array(np.linalg.inv(np.swapaxes(corner[:, 1:] - corner[:, :1], 1, 2)), dtype=wp.mat33)
+    tets, y = wp.array(mesh.tets, dtype=wp.vec4i), wp.array(mesh.vertices, dtype=wp.vec3)
+    lower, upper = (wp.array(side(corner, axis=1), dtype=wp.vec3) for side in (np.min, np.max))
+    boxes = wp.Bvh(lower, upper)
+    whole = wp.Mesh(y, wp.array(mesh.surface.ravel(), dtype=int))
     tet, weight = wp.zeros(n, dtype=int), wp.zeros(n, dtype=wp.vec4)
-    inputs = [wp.array(mesh.tets, dtype=wp.vec4i), pose, wp.array(mesh.vertices, dtype=wp.vec3)]
+    inputs = [boxes.id, whole.id, wp.array(_tet_of(mesh), dtype=int), tets, pose, y]
     inputs.append(wp.array(surface.vertices, dtype=wp.vec3))
     wp.launch(kernels.find_tets, n, inputs=inputs, outputs=[tet, weight])
     flat, normal = surface.triangles.ravel(), surface.normals
@@ -95,3 +100,10 @@ def _skin(mesh: TetMesh, surface: Surface) -> Skin:
         start=wp.array(np.append(0, np.cumsum(count)), dtype=int),
         around=wp.array(np.argsort(flat, kind="stable") // 3, dtype=int),
     )
+
+
+def _tet_of(mesh: TetMesh) -> np.ndarray:
+    """The tet of each triangle of the surface, which come in the order of their tets, (f,)."""
+    faces = mesh.tets[:, FACES].reshape(-1, 3)
+    row = np.unique(np.concatenate([faces, mesh.surface]), axis=0, return_inverse=True)[1].ravel()
+    return np.flatnonzero(np.isin(row[: len(faces)], row[len(faces) :])) // len(FACES)

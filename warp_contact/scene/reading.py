@@ -30,22 +30,27 @@ def main(kind: str, path: str, prim: str, limit: str) -> int:
     os.dup2(nowhere, 1)  # libraries print
     os.dup2(nowhere, 2)
     limit_memory(int(limit))
+    said = answer(kind, path, prim)
+    with out:
+        out.write(said)
+    return 0
+
+
+def answer(kind: str, path: str, prim: str) -> bytes:
+    """``+`` and what a reader finds in a file, or ``-`` and what is wrong with it."""
     printed = io.StringIO()
     try:
         with redirect_stdout(printed), redirect_stderr(printed):
-            answer = b"+" + READERS[kind](path, prim)
+            return b"+" + READERS[kind](path, prim)
     except Unfit as error:
-        answer = b"-" + str(error).encode(errors="replace")
+        return b"-" + str(error).encode(errors="replace")
     except MemoryError:
-        answer = b"-asks for more memory than a file of its size can need: it is damaged"
+        return b"-asks for more memory than a file of its size can need: it is damaged"
     except (Exception, SystemExit) as error:
         left = isinstance(error, SystemExit)  # as meshio does once it has printed why
         reason = in_short(printed.getvalue() if left else f"{type(error).__name__}: {error}")
         wrong = f"cannot be read ({reason}): it is damaged, or its name has the wrong ending"
-        answer = b"-" + wrong.encode(errors="replace")
-    with out:
-        out.write(answer)
-    return 0
+        return b"-" + wrong.encode(errors="replace")
 
 
 def limit_memory(size: int) -> None:

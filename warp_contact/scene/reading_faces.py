@@ -238,6 +238,7 @@ def usd_look(mesh, time, n: int) -> dict:
     return look
 
 
+reading.READERS |= {"faces": read_faces, "usd_faces": read_usd_faces}
+
 if __name__ == "__main__":
-    reading.READERS |= {"faces": read_faces, "usd_faces": read_usd_faces}
     sys.exit(reading.main(*sys.argv[1:]))

@@ -143,7 +143,10 @@ class BetweenFrames:
         if place is None and self._bodies.is_rigid(body):
             place = frame_of(part[chosen].astype(np.float64), mesh, every)
         way = place and (mesh, frame_of(before, mesh, every), place)
-        self._moves.begin(self._at(body, chosen), before, part[chosen], over, way)
+        try:
+            self._moves.begin(self._at(body, chosen), before, part[chosen], over, way)
+        except ValueError as error:
+            raise ValueError(f"body '{self._bodies.label(body)}': {error}") from None
 
     def pose(self, body: Body | int | str) -> tuple[np.ndarray, np.ndarray]:
         """Position [m] and rotation (x, y, z, w) of a body: x = R vertices + position.

@@ -60,7 +60,8 @@ class Moves:
         angle = float(np.linalg.norm(w))
         if angle > TURN * over:
             wrong = f"it would turn by {angle / over:.2g} rad a frame, and go straight within it"
-            raise ValueError(f"{wrong}: give over={int(np.ceil(angle / TURN))} or more frames")
+            least = int(np.ceil(angle / TURN))
+            raise ValueError(f"{wrong}: give over={least} or more frames, or a higher fps")
         of_move = {"over": over, "done": 0, "place": place, "turn": turn[0], "w": w}
         of_move = {name: np.array([value]) for name, value in of_move.items()}
         self._given.append(of_vertex | {"a": a, "b": b} | of_move)

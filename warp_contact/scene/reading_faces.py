@@ -32,7 +32,9 @@ def read_faces(path: str, _) -> bytes:
 
     if path.lower().endswith(".obj"):
         return read_obj(path)
-    mesh, counts, corners, others = polygons_of(path), [], [], []
+    mesh = polygons_of(path)
+    counts: list[int] = []
+    corners, others = [], []
     for block in mesh.cells:
         kind = block.type.rstrip("0123456789")
         if kind not in FACES:
@@ -74,7 +76,7 @@ def read_obj(path: str) -> bytes:
     """The same of an OBJ, whose corners have numbers of their own for uv and normals."""
     import numpy as np
 
-    found = {"v": [], "vt": [], "vn": []}
+    found: dict[str, list] = {"v": [], "vt": [], "vn": []}
     counts, corners, names, library = [], [], set(), ""
     with open(path, encoding="utf-8", errors="replace") as file:
         text = file.read().replace("\\\n", " ")
@@ -117,7 +119,8 @@ def look_of(library: Path, name: str) -> dict:
     """``colors`` and ``texture`` of a material in an MTL file, as far as they are there."""
     import numpy as np
 
-    look, own = {}, False
+    look: dict[str, np.ndarray] = {}
+    own = False
     if not library.is_file():
         return look
     for line in library.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -151,7 +154,8 @@ def read_usd_faces(path: str, argument: str) -> bytes:
     if fps and any(len(attribute.GetTimeSamples()) > 1 for attribute in faces):
         raise Unfit(f"the faces of {mesh.GetPath()} change: only its points may")
     counts, corners = (np.array(a.Get(first) or (), dtype=int) for a in faces)
-    (unit, has_unit), frames = reading.unit_of(stage), []
+    unit, has_unit = reading.unit_of(stage)
+    frames: list[np.ndarray] = []
     for time in frame_times(stage, mesh, float(fps)) if fps else [first]:
         points, place = (
             np.array(mesh.GetPointsAttr().Get(time), dtype=float),
@@ -238,7 +242,7 @@ def usd_look(mesh, time, n: int) -> dict:
     return look
 
 
-reading.READERS |= {"faces": read_faces, "usd_faces": read_usd_faces}
+reading.READERS.update(faces=read_faces, usd_faces=read_usd_faces)
 
 if __name__ == "__main__":
     sys.exit(reading.main(*sys.argv[1:]))

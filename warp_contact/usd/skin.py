@@ -7,6 +7,7 @@ once, in the frame of its mesh.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
@@ -26,7 +27,7 @@ class Render:
     """
 
     part: Part
-    surface: object
+    surface: Any
     texture: str
 
     @property
@@ -37,7 +38,8 @@ class Render:
 
 def renders(parts: list[Part], sim) -> list[Render]:
     """All of a simulation; pictures that bodies share have one name."""
-    found, names = [], {}
+    found: list[Render] = []
+    names: dict[Path, str] = {}
     for part in parts:
         surface = getattr(sim.scene.bodies[part.index], "render", None)
         if surface is not None:

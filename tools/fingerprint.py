@@ -158,6 +158,11 @@ RIGID = (  # under a soft one, and on it
     body(wc.box(0.1, 2), JELLY, (0.01, 0.0, 0.1503)),
     body(wc.box(0.05, 2), wc.Rigid(2000.0), (0.0, 0.02, 0.27), TILT),
 )
+MIXED = (  # a body too large for an inverse, a rigid one and a soft one
+    body(wc.box(0.2, 9), JELLY, 0.1001),
+    body(wc.box(0.06, 2), wc.Rigid(3000.0), (0.03, 0.0, 0.232), v=-0.5),
+    body(wc.box(0.06, 2), FIRM, (-0.05, 0.0, 0.232), v=-0.5),
+)
 
 falling = partial(run, 15, *BLOCKS, planes=[UP], fps=120)
 RUNS: dict[str, Callable[[], Run]] = {
@@ -189,6 +194,7 @@ RUNS: dict[str, Callable[[], Run]] = {
     "implicit_crushed": partial(run, 8, *CRUSHED, planes=[UP], integrator="implicit"),
     "implicit_crossed": partial(run, 20, *CROSSED, integrator="implicit"),
     "rigid": partial(run, 30, *RIGID, planes=[UP], friction=0.5),
+    "mixed": partial(run, 6, *MIXED, planes=[UP], friction=0.5, integrator="implicit"),
     "sheets": partial(paper, 10, "membrane_stack", count=3, gap=0.002),  # vertex on vertex
 }
 

@@ -16,6 +16,7 @@ from warp_contact.frame.integrator import KINDS as INTEGRATORS
 from warp_contact.frame.integrator import choose
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.stepper import Stepper
+from warp_contact.frame.surroundings import Surroundings
 from warp_contact.measure.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.scene.assemble import assemble
@@ -100,6 +101,7 @@ class Simulation(BetweenFrames, ContactData):
         shapes = find_shapes(self.model, x) if self._integrator.implicit else None
         self._stepper = Stepper(*of, *settings, shapes)
         self._meter = Meter(self.model)
+        self._surroundings = Surroundings(self.model)
 
     @property
     def substeps(self) -> int:
@@ -163,7 +165,8 @@ class Simulation(BetweenFrames, ContactData):
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Begin anew: the next frames give the bits of the first ones.
 
-        With ``worlds``, bodies in these alone are put where they began; ``frame`` and others go on.
+        With ``worlds``, bodies in these alone are put where they began; ``frame`` and others go on,
+        and gravity and friction stay.
 
         Raises:
             ValueError: no body is in one of the worlds
@@ -172,6 +175,7 @@ class Simulation(BetweenFrames, ContactData):
         if worlds is None:
             with exclusively(self.device):
                 self._stepper.reset()
+                self._surroundings.reset()
                 self._meter = Meter(self.model)
             self.frame = 0
             return
@@ -202,6 +206,8 @@ class Simulation(BetweenFrames, ContactData):
         with exclusively(self.device):
             values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
             values |= {"frame": np.array(self.frame)} | memory.values_of(self._stepper)
+            surroundings = {"surroundings": self._surroundings.values()}
+            values |= checkpoint.ungroup(surroundings)
             values |= {f"meter.{k}": value for k, value in self._meter.tunnelling.memory().items()}
         checkpoint.write(path, self._fingerprint(), values)
 
@@ -217,6 +223,7 @@ class Simulation(BetweenFrames, ContactData):
             self.state.x.assign(values["x"])
             self.state.v.assign(values["v"])
             memory.restore(self._stepper, values)
+            self._surroundings.restore(**checkpoint.group(values, "surroundings"))
             self._meter = Meter(self.model)
             self._meter.tunnelling.remember(checkpoint.group(values, "meter"))
         self.frame = int(values["frame"])
@@ -224,7 +231,7 @@ class Simulation(BetweenFrames, ContactData):
     def _fingerprint(self) -> str:
         sleeping = self._stepper.sleeping is not None
         settings = self.response, self.fps, self._stepper.wanted, sleeping, self._integrator.name
-        return checkpoint.fingerprint(self.model, *settings)
+        return checkpoint.fingerprint(self.model, *settings, self._surroundings.first)
 
 
 def _device(name: str | None) -> wp.Device:

@@ -10,14 +10,14 @@ from numpy.lib.recfunctions import repack_fields
 from warp_contact.data.model import Model
 from warp_contact.files import replacing
 
-FORMAT = 8
+FORMAT = 9
 
 
 def fingerprint(model: Model, *settings) -> str:
     """Digest of all that must be the same for a run to continue with the same bits."""
-    digest = hashlib.sha256(repr((FORMAT, model.gravity, settings)).encode())
+    digest = hashlib.sha256(repr((FORMAT, settings)).encode())
     arrays = [model.body_vert, model.body_world, model.tets, model.mass, model.inv_mass]
-    arrays += [model.plane_n, model.plane_h, model.friction]
+    arrays += [model.plane_n, model.plane_h]
     for elements in model.elements:
         digest.update(elements.kernels.__name__.encode())
         arrays += [elements.tet, elements.param]

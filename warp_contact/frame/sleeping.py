@@ -6,7 +6,8 @@ change by the motion that is stopped. A body that creeps slower than ``STILL`` i
 stopped too, unless moving fixed vertices drive it. ``Simulation.set_velocity`` wakes a body; a
 small velocity written into ``Simulation.state`` is lost on a sleeping one.
 
-Only for scenes with gravity: a body that stays in place despite its weight is supported.
+Only under gravity: a body that stays in place despite its weight is supported, else it may be in
+free flight.
 """
 
 import math
@@ -101,7 +102,7 @@ class Sleeping:
 
         Where all bodies of the scene do, stop everything, and return False.
         """
-        self._count_rest(state, of)
+        self._count_rest(state, of & self.model.gravity.any())
         bodies = self.awake.bodies.numpy()
         if bodies.all() and self._before.all():
             return True

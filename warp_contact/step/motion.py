@@ -42,7 +42,7 @@ def _kick_undamped(model: Model, state: State, work: Work, awake: Awake) -> None
         motion.kick,
         dim=model.n_vert,
         inputs=[model.vt_start, model.vt_corner, work.f_tet, awake.inv_mass]
-        + [wp.vec3(*model.gravity), work.dt, state.x, state.v],
+        + [model.g, work.dt, state.x, state.v],
         outputs=[work.x, state.v],
     )
 

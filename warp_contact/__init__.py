@@ -4,6 +4,7 @@ from warp_contact import interrupts  # noqa: F401  first, as the others take a s
 from warp_contact.errors import SimulationError
 from warp_contact.measure.contact_data import Contacts, PairForce
 from warp_contact.measure.measure import Measure
+from warp_contact.scene.attachments import Attachment
 from warp_contact.scene.materials import Corotated, NeoHookean, Rigid, SpringNetwork
 from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.scene import Body, Scene
@@ -13,6 +14,7 @@ from warp_contact.step.response import ContactSurface, Penalty, PredictedForce, 
 from warp_contact.usd.writer import UsdWriter
 
 __all__ = [
+    "Attachment",
     "Body",
     "ContactSurface",
     "Contacts",

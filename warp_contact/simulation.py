@@ -17,6 +17,7 @@ from warp_contact.frame.integrator import choose
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.stepper import Stepper
 from warp_contact.frame.surroundings import Surroundings
+from warp_contact.joined import Joined
 from warp_contact.measure.measure import Measure, Meter
 from warp_contact.progress import Progress
 from warp_contact.scene.assemble import assemble
@@ -30,7 +31,7 @@ KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce(),
 KNOWN += "wc.VirtualSurface(stiffness)"
 
 
-class Simulation(BetweenFrames, ContactData):
+class Simulation(BetweenFrames, ContactData, Joined):
     """Steps a scene frame by frame.
 
     Attributes:
@@ -186,8 +187,15 @@ class Simulation(BetweenFrames, ContactData):
             for body in np.flatnonzero(own == world):
                 part = self._bodies.range(int(body))
                 self._stepper.wrench.forget(int(body))
+                self._mend(int(body))
                 self.set_positions(int(body), x[part])
                 self.set_velocity(int(body), v[part])
+
+    def _mend(self, body: int) -> None:
+        """Let the attachments of a body hold as at the start."""
+        if self.model.ties:
+            with exclusively(self.device):
+                self._stepper.work.ties.mend((self.model.ties.body == body).any(axis=1))
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""

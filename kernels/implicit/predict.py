@@ -31,6 +31,7 @@ from warp_contact.kernels.options import OPTIONS
 wp.set_module_options(OPTIONS)
 
 SMALL = wp.constant(0.2)  # of the impulses: what their answer may lack
+EASED = wp.constant(0.25)  # part of what attached bodies lack that a step makes up for
 DAMPED = wp.constant(1.0)  # T: how much of what is not resolved is damped
 
 
@@ -186,24 +187,54 @@ def push(
         v[i] = v[i] + part * dt[i] * acceleration(i, b, x[i], d)
 
 
+@wp.func
+def lack_slowly(
+    b: int,
+    d: Implicit,
+    p: wp.array[wp.vec3],
+    ay: wp.array[wp.vec3],
+    lacking: wp.array[wp.vec3],
+):
+    """Add a part of p - A y of body b to what was lacking; less where it is large against p."""
+    given = float(0.0)
+    left = float(0.0)
+    for i in range(d.body_vert[b], d.body_vert[b + 1]):
+        if d.inv_mass[i] > 0.0:
+            given += wp.length_sq(p[i])
+            left += wp.length_sq(p[i] - ay[i])
+    part = float(0.0)
+    if left < given:
+        part = EASED * wp.min(2.0 - 2.0 * wp.sqrt(left / given), 1.0)
+    for i in range(d.body_vert[b], d.body_vert[b + 1]):
+        if d.inv_mass[i] > 0.0:
+            lacking[i] = (1.0 - EASED) * lacking[i] + part * (p[i] - ay[i])
+
+
 @wp.kernel
 def lack(
     # in
     d: Implicit,
     p: wp.array[wp.vec3],  # (n_vert,) [N s] of the contacts of this step
     ay: wp.array[wp.vec3],  # (n_vert,) [N s] A y
-    # out
+    tied: wp.array[int],  # (n_body,) 1 for a body that is attached; empty if none is
+    # in, out
     lacking: wp.array[wp.vec3],  # (n_vert,) [N s]
 ):
     """One thread per body that deforms: p - A y, which the next step makes up for.
 
     Contacts answer by the stiffness at rest. Without this a body that is strained would rest where
     A0^-1 p, and not A(x)^-1 p, balances the forces. Nothing where it is not small against p: in a
-    body that is crushed it would come too late, in a stiff one it is rounding.
+    body that is crushed it would come too late, in a stiff one it is rounding. A body that is
+    attached is held wherever it yields: only a part of it is made up for in each step, as
+    impulses may answer it by more than itself where the body is softer than at rest.
     """
     b = wp.tid()
     if not deforms(b, d):
         return
+    if tied.shape[0] > 0:
+        if tied[b] != 0:
+            lack_slowly(b, d, p, ay, lacking)
+            return
     given = wp.float64(0.0)
     left = wp.float64(0.0)
     for i in range(d.body_vert[b], d.body_vert[b + 1]):

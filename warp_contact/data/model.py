@@ -9,6 +9,8 @@ from types import ModuleType
 import numpy as np
 import warp as wp
 
+from warp_contact.data.tie_table import TieTable
+
 
 @dataclass(frozen=True)
 class Elements:
@@ -89,6 +91,7 @@ class Model:
         vn_vert: neighbours of each vertex along tet edges, ascending
         plane_n: outward unit normals, shape (n_plane,)
         plane_h: offsets along the normals [m], shape (n_plane,)
+        ties: the attachments, None where there is none
     """
 
     labels: tuple[str, ...]
@@ -133,3 +136,4 @@ class Model:
     vn_vert: wp.array
     plane_n: wp.array
     plane_h: wp.array
+    ties: TieTable | None = None

@@ -22,6 +22,10 @@ def fingerprint(model: Model, *settings) -> str:
         digest.update(elements.kernels.__name__.encode())
         arrays += [elements.tet, elements.param]
     digest.update(model.rest.tobytes())
+    if model.ties:
+        digest.update(repr(model.ties.labels).encode())
+        for array in (a for a in vars(model.ties).values() if isinstance(a, np.ndarray)):
+            digest.update(array.tobytes())
     for solid in filter(None, model.solids):
         digest.update(np.array([solid.mass, *solid.centre, *solid.inertia.ravel()]).tobytes())
     for array in arrays:

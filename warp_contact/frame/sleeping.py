@@ -21,6 +21,7 @@ from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.frame.turns import Turns
 from warp_contact.kernels.motion import sleeping as kernels
+from warp_contact.step.ties import wake_attached
 
 REST_TIME = 0.5  # s that a body has to be at rest before it may sleep
 
@@ -161,6 +162,8 @@ class Sleeping:
             inputs=[broad.bodies.id, self.model.body_world, broad.lower, broad.upper, self._mobile],
             outputs=[self.awake.bodies, self._again],
         )
+        if work.ties:
+            wake_attached(self._mobile, self.awake.bodies, self._again, work)
 
     def _skip_frame(self, state: State, work: Work) -> None:
         state.v.zero_()

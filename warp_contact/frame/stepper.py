@@ -207,6 +207,8 @@ class Stepper:
         self.wrench.clear()
         self.spectrum.start_from({})
         forget(self.work)
+        if self.work.ties:
+            self.work.ties.mend(slice(None))
         if self.sleeping:
             self.sleeping.wake_all(self.last.overlapping < 0, self.work)
 
@@ -256,10 +258,7 @@ class Stepper:
         self.wrench.shift(self._model, self._state, work, lag)
         work.dt.assign(self._dt[of_vert].astype(np.float32))
         self.wrench.begin(self._model, self._state, work)
-        work.overflow.all.zero_()
-        work.surface.was_old.zero_()
-        work.worlds.apart.assign((~self._overlapping).astype(np.int32))
-        work.broad_phase.bodies.rebuild()
+        self.buffers.begin_frame(self._overlapping)
         graph = self.buffers.graph(damping_stages, bool(self._overlapping.any()))
         for count, begun, looked in segments(self._n, in_parts, PART):
             self._turns.begin(begun, self._dt, work, self._start)

@@ -32,10 +32,14 @@ def kick(model: Model, state: State, work: Work) -> None:
 def find_lacking(model: Model, state: State, work: Work) -> None:
     """Set what the answer of the bodies to the contacts of this step lacked; before the drift."""
     w, n = work.implicit, model.n_vert
+    tied = work.ties.attached if work.ties else w.every
     wp.launch(predict.difference, n, inputs=[w.bodies, state.v, w.predicted], outputs=[w.p])
     _multiply(model, state.x, w.p, w.ap, w, w.every)
     wp.launch(
-        predict.lack, model.n_body, inputs=[w.bodies, w.total, w.ap], outputs=[work.warm.lacking]
+        predict.lack,
+        model.n_body,
+        inputs=[w.bodies, w.total, w.ap, tied],
+        outputs=[work.warm.lacking],
     )
 
 

@@ -6,7 +6,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work
 from warp_contact.kernels.motion import motion
-from warp_contact.step import implicit
+from warp_contact.step import implicit, ties
 from warp_contact.step.damping import kick_damped
 from warp_contact.step.forces import internal_forces
 
@@ -14,6 +14,9 @@ from warp_contact.step.forces import internal_forces
 def predict(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Let forces, weight and damping act on ``state.v`` for a step; set ``work.x`` = x + h v."""
     kick(model, state, work, work.awake, damping_stages)
+    if work.ties:
+        ties.hold(model, state, work)
+        implicit.drift(model, state, work, work.x)
 
 
 def kick(model: Model, state: State, work: Work, awake: Awake, damping_stages: int = 0) -> None:
@@ -28,6 +31,8 @@ def kick(model: Model, state: State, work: Work, awake: Awake, damping_stages: i
         _kick_undamped(explicit, state, work, awake)
     if work.implicit:
         implicit.kick(work.implicit.deforming, state, work)
+        if work.ties:
+            ties.begin(state.x, work)
         implicit.drift(model, state, work, work.x)
 
 
@@ -56,6 +61,8 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
 
 def finish(model: Model, state: State, work: Work) -> None:
     """Move ``state.x`` by ``state.v``, to the end of the step."""
+    if work.ties:
+        ties.finish(model, state, work)
     if work.implicit:
         implicit.find_lacking(work.implicit.deforming, state, work)
         return implicit.drift(model, state, work, state.x, turned=True)
@@ -64,6 +71,8 @@ def finish(model: Model, state: State, work: Work) -> None:
 
 def finish_free(model: Model, state: State, work: Work) -> None:
     """The same where nothing touched: ``work.x`` is the end of the step."""
+    if work.ties:
+        return finish(model, state, work)
     if work.implicit:
         return implicit.drift(model, state, work, state.x, turned=True)
     wp.copy(state.x, work.x)

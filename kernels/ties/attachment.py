@@ -2,18 +2,19 @@
 
     F = |sum of the impulses of its ties in a step| / h         breaks above its limit        [N]
 
-Bodies that are attached to each other make no contacts, as long as no attachment of them is broken.
+Bodies that are attached to each other make no contacts, as long as one of their attachments holds.
 """
 
 import warp as wp
 
 from warp_contact.kernels.broad_phase.pairs import PairList
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.ties.tie import Ties
+from warp_contact.kernels.ties.tie import HELD, Ties, across, direction, gap
 
 wp.set_module_options(OPTIONS)
 
 NEVER = wp.constant(1.0e30)  # a way that no body goes [m]
+OPEN = wp.constant(1.0e-4)  # of an edge: a hard tie that is left wider is not solved
 
 
 @wp.struct
@@ -41,19 +42,33 @@ class Partners:
 def record(
     # in
     dt: wp.array[float],  # (n_vert,) [s]
+    body_edge: wp.array[float],  # (n_body,) [m]
+    x: wp.array[wp.vec3],  # (n_vert,) [m] at the end of the step
+    world: wp.array[int],  # (n_vert,) number of the world of each vertex
     ties: Ties,
     # in, out
     of: Attachments,
     # out
     stale: wp.array[int],  # (1,) 1 where one breaks: its bodies may touch
+    # out, added to
+    unsolved: wp.array[int],  # (n_world,) how often one was not solved
 ):
     """One thread per attachment: add its impulse of a step, and break it if that is too large."""
     a = wp.tid()
     p = wp.vec3d()
+    open = bool(False)
     for k in range(of.first[a], of.first[a + 1]):
-        p += ties.held[of.tie[k]]
+        t = of.tie[k]
+        p += ties.held[t]
+        if ties.state[t] == HELD and ties.compliance[t] == 0.0:
+            c = across(gap(t, ties.now[t], ties.at[t], ties, x), direction(t, ties, x))
+            if wp.length(c) > wp.float64(OPEN * body_edge[of.body[a][0]]):
+                open = True
     of.impulse[a] = of.impulse[a] + p
-    h = dt[ties.vert[of.tie[of.first[a]]][0]]
+    i = ties.vert[of.tie[of.first[a]]][0]
+    h = dt[i]
+    if open:
+        wp.atomic_add(unsolved, world[i], 1)
     if of.broken[a] == 0 and wp.length(p) > wp.float64(of.limit[a] * h):
         of.broken[a] = 1
         stale[0] = 1

@@ -98,6 +98,17 @@ def test_fingers_pushed_by_a_force_hold_what_is_shaken_as_their_cone_says():
         assert slipped < 3e-4 if shaken < most else slipped > 1e-3
 
 
+def test_what_is_squeezed_without_friction_is_solved():
+    """Light pads behind which a finger stands: by row sums of free ones it would take too long."""
+    sim, unsolved = gripper(0.0), 0
+    for inwards, frames in ((0.025, 6), (0.0, 14)):
+        drive(sim, inwards, 0.0, 0)
+        for _ in sim.frames(frames):
+            unsolved += sim.measure().unsolved
+    assert sim.measure().n_contacts > 10
+    assert unsolved == 0
+
+
 def test_threads_may_take_lists_of_ties_in_any_order(monkeypatch):
     def bits() -> list[bytes]:
         sim = gripper(0.4)

@@ -5,6 +5,7 @@ import pytest
 
 import warp_contact as wc
 from warp_contact.frame import implicit_shapes
+from warp_contact.step import ties
 
 G = 9.81
 SOLID, SOFT = wc.Rigid(1000.0), wc.NeoHookean(2e5, 0.3, 1000.0, 2e-3)
@@ -155,6 +156,15 @@ def test_a_body_too_large_for_implicit_steps_is_held_beside_them(monkeypatch):
     assert sim.attachment_force("weld")[2] == pytest.approx(weight, rel=0.02)
     assert sim.attachment_force("hook")[2] == pytest.approx(2.0 * weight, rel=0.02)
     assert np.abs(sim.positions("lower")[top][:, 2] + 0.05).max() < 1e-6
+
+
+def test_points_that_stay_apart_are_counted_as_not_solved(monkeypatch):
+    sim = scene_of(0, limit=10.0)
+    assert max(sim.measure().unsolved for _ in sim.frames(3)) == 0
+    monkeypatch.setattr(ties, "ROUNDS", 0)  # nothing is held
+    other = scene_of(0, limit=10.0)
+    other.step_frame()
+    assert other.measure().unsolved > 0
 
 
 REFUSED = [

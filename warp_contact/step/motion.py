@@ -62,11 +62,14 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
 def finish(model: Model, state: State, work: Work) -> None:
     """Move ``state.x`` by ``state.v``, to the end of the step."""
     if work.ties:
-        ties.finish(model, state, work)
+        ties.hold(model, state, work)  # what contacts have moved
     if work.implicit:
         implicit.find_lacking(work.implicit.deforming, state, work)
-        return implicit.drift(model, state, work, state.x, turned=True)
-    drift(model, state, work, state.x)
+        implicit.drift(model, state, work, state.x, turned=True)
+    else:
+        drift(model, state, work, state.x)
+    if work.ties:
+        ties.record(model, state.x, work)
 
 
 def finish_free(model: Model, state: State, work: Work) -> None:

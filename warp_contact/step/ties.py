@@ -94,11 +94,11 @@ def settle(model: Model, y: wp.array, work: Work, keeps: bool) -> None:
         _pull(model, y, work, keeps)
 
 
-def finish(model: Model, state: State, work: Work) -> None:
-    """Hold what contacts moved, and add the forces of the step to those of the frame."""
-    hold(model, state, work)
+def record(model: Model, x: wp.array, work: Work) -> None:
+    """Add the forces of the step, which ends at ``x``, to those of the frame; break what breaks."""
     t = work.ties
-    inputs, outputs = [work.dt, t.ties], [t.attachments, work.broad_phase.stale]
+    inputs = [work.dt, model.body_edge, x, work.worlds.of_vert, t.ties]
+    outputs = [t.attachments, work.broad_phase.stale, work.worlds.unsolved]
     wp.launch(attachment.record, t.n_attachment, inputs=inputs, outputs=outputs)
 
 

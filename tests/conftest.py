@@ -72,7 +72,7 @@ def _model(*bodies, fixed=(), gravity=(0.0, 0.0, 0.0)) -> SimpleNamespace:
         first += len(t)
     return SimpleNamespace(
         elements=tuple(elements),
-        gravity=gravity,
+        g=wp.array([gravity], dtype=wp.vec3),
         n_body=len(bodies),
         n_vert=len(x),
         n_tet=len(tets),

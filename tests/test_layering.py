@@ -28,8 +28,9 @@ MAY = {  # room: those that it may import, beside itself
     "picture": {"kernels", "usd", "checks"},
     "between_frames": {"data", "scene", "frame", "measure", "exclusive", "checks"},
     "contact_data": {"data", "scene", "frame", "measure"},
+    "joined": {"data", "scene", "frame", "exclusive", "checks"},
     "simulation": {"data", "scene", "step", "frame", "measure", "between_frames"}
-    | {"contact_data", "errors", "progress", "exclusive", "checks"},
+    | {"contact_data", "joined", "errors", "progress", "exclusive", "checks"},
     "runs": {"checks", "files", "usd"},
     "__init__": {"scene", "step", "measure", "usd", "simulation", "errors", "interrupts"}
     | {"runs"},
@@ -46,6 +47,7 @@ LADDER = (  # of the kernel rooms: each may import those before it
     {"broad_phase"},
     {"narrow_phase"},
     {"impulse"},
+    {"ties"},
     {"surface"},
     {"output"},
 )

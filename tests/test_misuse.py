@@ -28,7 +28,7 @@ def test_each_wrong_call_is_refused_in_one_line():
     ],
 )
 def test_the_reason_has_name_value_and_remedy(call, words):
-    names = misuse.NAMES | {"scene": misuse.scene, "add": misuse.add}
+    names = misuse.NAMES | {"scene": misuse.scene, "add": misuse.add, "attach": misuse.attach}
     assert misuse.answer(call) == ""
     with pytest.raises(ValueError) as caught:
         eval(call, names)

@@ -5,6 +5,7 @@ from warp_contact.errors import SimulationError
 from warp_contact.measure.contact_data import Contacts, PairForce
 from warp_contact.measure.measure import Measure
 from warp_contact.runs import sweep
+from warp_contact.scene.attachments import Attachment
 from warp_contact.scene.materials import Corotated, NeoHookean, Rigid, SpringNetwork
 from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.scene import Body, Scene
@@ -16,6 +17,7 @@ from warp_contact.step.response import ContactSurface, Penalty, PredictedForce, 
 from warp_contact.usd.writer import UsdWriter
 
 __all__ = [
+    "Attachment",
     "Body",
     "ContactSurface",
     "Contacts",

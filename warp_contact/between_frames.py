@@ -1,13 +1,17 @@
 """What a user reads and sets of a simulation between its frames."""
 
+from functools import partial
+
 import numpy as np
 
 from warp_contact import checks
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.exclusive import exclusively
+from warp_contact.frame import between
 from warp_contact.frame.moves import Moves
 from warp_contact.frame.stepper import Stepper
+from warp_contact.frame.surroundings import Surroundings
 from warp_contact.measure.measure import Meter
 from warp_contact.measure.skins import Skins
 from warp_contact.scene.mesh import TetMesh
@@ -26,6 +30,7 @@ class BetweenFrames:
     device: object
     _bodies: Bodies
     _stepper: Stepper
+    _surroundings: Surroundings
     _meter: Meter
     _moves: Moves
     _skins: Skins
@@ -213,7 +218,7 @@ class BetweenFrames:
             if self._stepper.sleeping:
                 self._stepper.sleeping.wake(index)
 
-    def _wake(self, at: np.ndarray) -> None:
+    def _wake_bodies(self, at: np.ndarray) -> None:
         """Wake the bodies of vertices ``at``."""
         if self._stepper.sleeping:
             for index in np.unique(self.model.vert_body.numpy()[at]).tolist():
@@ -225,6 +230,47 @@ class BetweenFrames:
 
     def _mesh(self, body: Body | int | str) -> TetMesh:
         return self.scene.bodies[self._bodies.index(body)].mesh
+
+    def set_gravity(self, gravity) -> None:
+        """Set gravity [m/s^2], shape (3,), for the frames to come; all bodies wake.
+
+        Raises:
+            ValueError: it is not three finite numbers
+        """
+        g = checks.numbers(gravity, (3,), "gravity")
+        with exclusively(self.device):
+            s = self._stepper
+            s.buffers.set_steps(s.last.dt)
+            change = partial(self._surroundings.set_gravity, g)
+            between.change_gravity(self.model, self.state, s.work, s.last_dt, change)
+            self._wake(np.ones(s.worlds.n, dtype=bool))
+
+    def set_friction(self, of: Body | int | str, friction: float) -> None:
+        """Set the Coulomb coefficient of a body or a plane for the frames to come.
+
+        Between two of them the mean of theirs counts. Bodies of its world wake, of a plane all.
+
+        Args:
+            of: the body, or the name of a plane, such as ``plane0``
+            friction: coefficient [-]
+
+        Raises:
+            ValueError: there is no such body or plane, or it is negative or not finite
+        """
+        friction = checks.number(friction, "friction", least=0.0)
+        index = self._bodies.index_or_plane(of)
+        of_body = self._stepper.worlds.of_body
+        woken = np.ones(self._stepper.worlds.n, dtype=bool)
+        if index < self.model.n_body:
+            woken = np.arange(len(woken)) == of_body[index]
+        with exclusively(self.device):
+            self._surroundings.set_friction(index, friction)
+            self._wake(woken)
+
+    def _wake(self, worlds: np.ndarray) -> None:
+        """Wake all bodies of worlds, a mask."""
+        if self._stepper.sleeping:
+            self._stepper.sleeping.wake_all(worlds, self._stepper.work)
 
     def _centre(self, body: Body | int | str, x: np.ndarray) -> np.ndarray:
         """Centre of mass [m] of a body at ``x``, shape (3,)."""

@@ -17,6 +17,8 @@ from warp_contact.frame.integrator import choose
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.moves import Moves
 from warp_contact.frame.stepper import Stepper
+from warp_contact.frame.surroundings import Surroundings
+from warp_contact.joined import Joined
 from warp_contact.measure.measure import Measure, Meter
 from warp_contact.measure.skins import Skins
 from warp_contact.progress import Progress
@@ -31,7 +33,7 @@ KNOWN = "one of wc.ContactSurface(), wc.Penalty(stiffness), wc.PredictedForce(),
 KNOWN += "wc.VirtualSurface(stiffness)"
 
 
-class Simulation(BetweenFrames, ContactData):
+class Simulation(BetweenFrames, ContactData, Joined):
     """Steps a scene frame by frame.
 
     Attributes:
@@ -104,6 +106,7 @@ class Simulation(BetweenFrames, ContactData):
         )
         self._meter, self._moves = Meter(self.model), Moves()
         self._skins = Skins(self.scene, self.model)
+        self._surroundings = Surroundings(self.model)
 
     @property
     def substeps(self) -> int:
@@ -161,14 +164,15 @@ class Simulation(BetweenFrames, ContactData):
             SimulationError: as ``frames``
         """
         with exclusively(self.device), self._moves.frame(self.state, self.fps) as at:
-            self._wake(at)
+            self._wake_bodies(at)
             self._stepper.step(self.frame + 1)
         self.frame += 1
 
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Begin anew: the next frames give the bits of the first ones.
 
-        With ``worlds``, bodies in these alone are put where they began; ``frame`` and others go on.
+        With ``worlds``, bodies in these alone are put where they began; ``frame`` and others go on,
+        and gravity and friction stay.
 
         Raises:
             ValueError: no body is in one of the worlds
@@ -178,6 +182,7 @@ class Simulation(BetweenFrames, ContactData):
             with exclusively(self.device):
                 self._stepper.reset()
                 self._moves.clear()
+                self._surroundings.reset()
                 self._meter = Meter(self.model)
             self.frame = 0
             return
@@ -188,8 +193,15 @@ class Simulation(BetweenFrames, ContactData):
             for body in np.flatnonzero(own == world):
                 part = self._bodies.range(int(body))
                 self._stepper.wrench.forget(int(body))
+                self._mend(int(body))
                 self.set_positions(int(body), x[part])
                 self.set_velocity(int(body), v[part])
+
+    def _mend(self, body: int) -> None:
+        """Let the attachments of a body hold as at the start."""
+        if self.model.ties:
+            with exclusively(self.device):
+                self._stepper.work.ties.mend((self.model.ties.body == body).any(axis=1))
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""
@@ -210,6 +222,7 @@ class Simulation(BetweenFrames, ContactData):
             values |= {"frame": np.array(self.frame)} | memory.values_of(self._stepper)
             of_meter, moves = self._meter.tunnelling.memory(), self._moves.values()
             values |= checkpoint.ungroup({"meter": of_meter, "moves": moves})
+            values |= checkpoint.ungroup({"surroundings": self._surroundings.values()})
         checkpoint.write(path, self._fingerprint(), values)
 
     def load(self, path: str | os.PathLike) -> None:
@@ -224,6 +237,7 @@ class Simulation(BetweenFrames, ContactData):
             self.state.x.assign(values["x"])
             self.state.v.assign(values["v"])
             memory.restore(self._stepper, values)
+            self._surroundings.restore(**checkpoint.group(values, "surroundings"))
             self._meter = Meter(self.model)
             self._meter.tunnelling.remember(checkpoint.group(values, "meter"))
             self._moves.restore(checkpoint.group(values, "moves"))
@@ -232,7 +246,7 @@ class Simulation(BetweenFrames, ContactData):
     def _fingerprint(self) -> str:
         sleeping = self._stepper.sleeping is not None
         settings = self.response, self.fps, self._stepper.wanted, sleeping, self._integrator.name
-        return checkpoint.fingerprint(self.model, *settings)
+        return checkpoint.fingerprint(self.model, *settings, self._surroundings.first)
 
 
 def _device(name: str | None) -> wp.Device:

@@ -110,7 +110,7 @@ def load(
     stiff: wp.array[wp.vec3],  # (4 n_tet,) corners of K u [N/s]
     f: wp.array[wp.vec3],  # (n_vert,) [N]
     lacking: wp.array[wp.vec3],  # (n_vert,) [N] see settle.py
-    gravity: wp.vec3,  # [m/s^2]
+    gravity: wp.array[wp.vec3],  # (1,) [m/s^2]
     d: Implicit,
     # out
     r: wp.array[wp.vec3],  # (n_vert,) [kg m/s]
@@ -123,7 +123,7 @@ def load(
         h = d.h[b]
         s = h * f[i] - DAMPED * h * h * corner_sum(i, vt_start, vt_corner, stiff) + h * lacking[i]
         if d.kind[b] == HELD:
-            s += h * d.mass[i] * gravity
+            s += h * d.mass[i] * gravity[0]
         r[i] = s
 
 
@@ -148,7 +148,7 @@ def kick(
     # in
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     dv: wp.array[wp.vec3],  # (n_vert,) [m/s] of a whole step
-    gravity: wp.vec3,  # [m/s^2]
+    gravity: wp.array[wp.vec3],  # (1,) [m/s^2]
     dt: wp.array[float],  # (n_vert,) [s] h, or a part of it
     d: Implicit,
     motion: RigidMotion,  # of dv
@@ -164,7 +164,7 @@ def kick(
         return
     u = dv[i]
     if floats(b, d):
-        u += d.h[b] * (gravity + acceleration(i, b, x[i], d)) - rigid_at(i, b, x[i], d, motion)
+        u += d.h[b] * (gravity[0] + acceleration(i, b, x[i], d)) - rigid_at(i, b, x[i], d, motion)
     v[i] = v[i] + (dt[i] / d.h[b]) * u
 
 

@@ -64,6 +64,7 @@ def find_lacking(
     d: Implicit,
     p: wp.array[wp.vec3],  # (n_vert,) [N s] of the contacts of this step
     ay: wp.array[wp.vec3],  # (n_vert,) [N s] A y
+    attached: wp.array[int],  # (n_body,) 1 for a body that is; empty if none is
     # in, out
     to: Settling,
     worlds: Worlds,  # those with a body that needs a pass are open
@@ -73,10 +74,15 @@ def find_lacking(
     # out, added to
     bodies: wp.array[int],  # (1,) that need a pass
 ):
-    """One thread per body: what it lacks, and whether that needs a pass."""
+    """One thread per body: what it lacks, and whether that needs a pass; not where it is attached."""
     b = wp.tid()
     first = d.body_vert[b]
     last = d.body_vert[b + 1]
+    if attached.shape[0] > 0:
+        if attached[b] != 0:
+            for i in range(first, last):
+                q[i] = wp.vec3(0.0, 0.0, 0.0)
+            return
     given = wp.float64(0.0)
     left = wp.float64(0.0)
     for i in range(first, last):

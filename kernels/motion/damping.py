@@ -47,7 +47,7 @@ def load(
     vt_corner: wp.array[int],  # (4 n_tet,)
     f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N], elastic forces
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
-    gravity: wp.vec3,  # [m/s^2]
+    gravity: wp.array[wp.vec3],  # (1,) [m/s^2]
     dt: wp.array[float],  # (n_vert,) [s]
     last: wp.array[wp.vec3],  # (n_vert,) [m/s] change by contacts in the last step
     before: wp.array[wp.vec3],  # (n_vert,) [m/s] in the one before it
@@ -58,7 +58,7 @@ def load(
     i = wp.tid()
     b[i] = wp.vec3(0.0, 0.0, 0.0)
     if inv_mass[i] > 0.0:
-        a = inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet) + gravity
+        a = inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet) + gravity[0]
         b[i] = dt[i] * a + expected(last[i], before[i])
 
 

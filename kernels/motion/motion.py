@@ -46,7 +46,7 @@ def kick(
     vt_corner: wp.array[int],  # (4 n_tet,)
     f_tet: wp.array[wp.vec3],  # (4 n_tet,) [N]
     inv_mass: wp.array[float],  # (n_vert,) [1/kg], 0 for a fixed vertex
-    gravity: wp.vec3,  # [m/s^2]
+    gravity: wp.array[wp.vec3],  # (1,) [m/s^2]
     dt: wp.array[float],  # (n_vert,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
@@ -59,7 +59,7 @@ def kick(
     h = dt[i]
     u = v[i]
     if inv_mass[i] > 0.0:
-        u += h * (inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet) + gravity)
+        u += h * (inv_mass[i] * corner_sum(i, vt_start, vt_corner, f_tet) + gravity[0])
     v_new[i] = u
     x_new[i] = x[i] + h * u
 

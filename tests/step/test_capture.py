@@ -53,7 +53,8 @@ def touching(overlap: float, upper=None) -> Scene:
 
 @pytest.mark.parametrize("overlap", [0.0, 0.03])
 @pytest.mark.parametrize(
-    "name", [*RESPONSES, "implicit", "rigid", "rigid penalty", "rigid predicted", "mixed"]
+    "name",
+    [*RESPONSES, "implicit", "rigid", "rigid penalty", "rigid predicted", "mixed", "rigid tied"],
 )
 def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap):
     captured = []
@@ -76,6 +77,9 @@ def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap
     if name == "mixed":
         monkeypatch.setattr(implicit_shapes, "LARGEST", 30)  # the upper block is lumped
     scene = touching(overlap, Rigid(1000.0) if name.startswith("rigid") else None)
+    if name == "rigid tied":
+        scene.attach(1, kind="ball", at=(0.03, 0.0, 0.2), breaking_force=1e6)
+        scene.attach(0, kind="weld", vertices=range(9), stiffness=10.0)
     integrator = "explicit" if name in RESPONSES else "implicit"
     sim = Simulation(scene, RESPONSES.get(name.removeprefix("rigid ")), integrator=integrator)
     assert any(sim.contact_fields()["pressure"].any() for _ in sim.frames(2))

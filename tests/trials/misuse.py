@@ -22,7 +22,7 @@ SECONDS = 20  # that a call may take
 FOLDER = tempfile.mkdtemp()
 CALLS = Path(__file__).with_suffix(".txt")
 OPTIONAL = ("unit=", "welded(", "pressure_scale=", ", substeps=", "layers=", "positions(None")
-OPTIONAL += ("executor=", "out=", "render=")
+OPTIONAL += ("executor=", "out=", "render=", "stiffness=", "_force=")
 NAMES = {"wc": wc, "np": np, "nan": np.nan, "inf": np.inf, "FOLDER": FOLDER}
 NAMES |= {"mesh": lambda: wc.box(0.1, 2), "sim": lambda: NAMES["_sim"]}
 NAMES |= {"surface": lambda: wc.Surface(NAMES["mesh"]().vertices, NAMES["mesh"]().surface)}
@@ -50,6 +50,11 @@ def add(**given) -> wc.Body:
     return scene().add_body(**block | {"position": (1.0, 0.0, 0.0)} | given)
 
 
+def attach(**given) -> wc.Attachment:
+    """Attach a block to the world at a point, some of the arguments replaced."""
+    return scene().attach(**{"a": "a", "kind": "ball", "at": (0.0, 0.0, 0.05)} | given)
+
+
 def calls() -> list[str]:
     """All wrong calls."""
     found, everywhere = [], []
@@ -69,7 +74,7 @@ def answer(call: str) -> str:
     if "_sim" not in NAMES:
         NAMES["_sim"] = wc.Simulation(scene())
     try:
-        eval(call, NAMES | {"scene": scene, "add": add})
+        eval(call, NAMES | {"scene": scene, "add": add, "attach": attach})
     except (ValueError, OSError) as error:
         text = str(error)
         plain = "\n" not in text and len(text) < 400 and not re.search(r"\w+Error:", text)

@@ -1,4 +1,4 @@
-"""What does not change during a run.
+"""What does not change within a frame.
 
 All arrays are flat over the whole scene. A body is a range of vertices, tets and triangles.
 """
@@ -8,6 +8,8 @@ from types import ModuleType
 
 import numpy as np
 import warp as wp
+
+from warp_contact.data.tie_table import TieTable
 
 
 @dataclass(frozen=True)
@@ -44,14 +46,15 @@ class Solid:
 
 @dataclass(frozen=True)
 class Model:
-    """What does not change during a run.
+    """What does not change during a run, gravity and friction within a frame.
 
     Attributes:
         labels: name of each body
         materials: material of each body, as given by the user
         solids: of each body that is rigid and moves freely, None for the others
         elements: the tets of bodies that deform by forces, one entry for each material model in use
-        gravity: acceleration [m/s^2]
+        gravity: acceleration [m/s^2], NumPy, shape (3,)
+        g: the same where kernels read it, shape (1,)
         friction: Coulomb coefficient of each body, then of each plane, shape (n_body + n_plane,)
         n_body: number of bodies
         n_vert: number of vertices
@@ -88,13 +91,15 @@ class Model:
         vn_vert: neighbours of each vertex along tet edges, ascending
         plane_n: outward unit normals, shape (n_plane,)
         plane_h: offsets along the normals [m], shape (n_plane,)
+        ties: the attachments, None where there is none
     """
 
     labels: tuple[str, ...]
     materials: tuple
     solids: tuple[Solid | None, ...]
     elements: tuple[Elements, ...]
-    gravity: tuple[float, float, float]
+    gravity: np.ndarray
+    g: wp.array
     friction: wp.array
     n_body: int
     n_vert: int
@@ -131,3 +136,4 @@ class Model:
     vn_vert: wp.array
     plane_n: wp.array
     plane_h: wp.array
+    ties: TieTable | None = None

@@ -43,11 +43,12 @@ def allocate(n_vert: int, n_contact: int, implicit: bool) -> WarmStart:
     )
 
 
-def forget(warm: WarmStart) -> None:
-    """The next step has no impulses to start from."""
+def forget(warm: WarmStart, lacking: bool = True) -> None:
+    """The next step has no impulses to start from; nor does it know what was ``lacking``."""
     warm.partner.fill_(-1)
     warm.n_edge.zero_()
-    warm.lacking.zero_()
+    if lacking:
+        warm.lacking.zero_()
 
 
 def copied(warm: WarmStart) -> WarmStart:

@@ -20,6 +20,7 @@ from warp_contact.data import (
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
 from warp_contact.data.structs import mesh_of, mobility_of, n_world, worlds_of
+from warp_contact.data.ties import TieWork
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.mobility import Mobility
 from warp_contact.kernels.worlds import Worlds
@@ -50,6 +51,7 @@ class Work:
         surface: scratch of the search for the contact surface
         forces: what contact did in the frame
         warm: the impulses of the last step
+        ties: the attachments; None where there is none
     """
 
     capacity: overflow.Capacity
@@ -72,6 +74,7 @@ class Work:
     surface: surface.Surface
     forces: contact_forces.ContactForces
     warm: warm_start.WarmStart
+    ties: TieWork | None
 
 
 def everything(model: Model) -> Awake:
@@ -90,11 +93,12 @@ def allocate_work(
     awake: Awake | None = None,
     unit: float = 1.0,
     shapes: implicit.Shapes | None = None,
+    ties: TieWork | None = None,
 ) -> Work:
     """Allocate for a step on the current device; the Bvhs are built around ``state.x``.
 
     ``unit`` is the resolution of the recorded impulses [N s], ``awake`` what moves, None for
-    everything, and ``shapes`` those of bodies that take implicit steps, None where none does.
+    everything, ``shapes`` and ``ties`` of implicit bodies and attachments, None where none is.
     """
     n, m = model.n_vert, capacity.contacts
     awake = awake or everything(model)
@@ -125,6 +129,7 @@ def allocate_work(
         surface=of_surface,
         forces=forces,
         warm=warm_start.allocate(n, m, shapes is not None),
+        ties=ties,
     )
 
 

@@ -1,5 +1,7 @@
 """What is read and set between two frames, where velocities are half a step behind positions."""
 
+from collections.abc import Callable
+
 import numpy as np
 import warp as wp
 
@@ -52,6 +54,22 @@ def set_velocities(
         shift_velocities(model, now, work, awake, 0.5 * dt)
         v[at] += values - now.v.numpy()[at]
     state.v.assign(v)
+
+
+def change_gravity(
+    model: Model, state: State, work: Work, dt: np.ndarray, change: Callable[[], None]
+) -> None:
+    """Let gravity ``change`` at that time: half of the last step ``dt`` [s] (n_vert,) was before.
+
+    Velocities there stay as they are.
+    """
+    moving = np.flatnonzero(model.inv_mass.numpy() > 0.0)
+    now = State(state.x, wp.clone(state.v))
+    awake = everything(work.implicit.lumped or model if work.implicit else model)
+    shift_velocities(model, now, work, awake, 0.5 * dt)
+    change()
+    if dt.any():
+        set_velocities(model, state, work, dt, now.v.numpy()[moving], moving)
 
 
 def set_positions(

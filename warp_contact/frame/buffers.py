@@ -3,7 +3,7 @@
 import numpy as np
 import warp as wp
 
-from warp_contact.data import damping
+from warp_contact.data import damping, ties
 from warp_contact.data.implicit import Shapes, set_blocks
 from warp_contact.data.model import Model
 from warp_contact.data.overflow import Capacity
@@ -13,6 +13,7 @@ from warp_contact.frame.implicit_shapes import Inverses
 from warp_contact.frame.worlds import Worlds
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.step.ties import begin_frame
 
 NEIGHBOURS = 8  # initial capacity: pairs with a contact force for each body
 IMPULSE_UNIT = 1e-13  # momentum of one count of the recorded impulses, for all mobile mass at 1 m/s
@@ -41,6 +42,7 @@ class Buffers:
         self._worlds, self.shapes = worlds, shapes
         self._inverses = Inverses(model, shapes) if shapes else None
         self._steps = np.zeros(0)  # of the bodies, that the mobilities are for [s]
+        self._ties = ties.allocate(model, shapes.lumped) if shapes else None
         self._model, self._state, self._awake = model, state, awake
         self.response = response
         inv_mass = model.inv_mass.numpy()
@@ -66,6 +68,16 @@ class Buffers:
         first = which * len(found[0][1])  # of the blocks of all shapes for the step of each body
         if set_blocks(work.implicit, self.shapes, steps, first, blocks, norms):
             self._graphs.clear()
+
+    def begin_frame(self, overlapping: np.ndarray) -> None:
+        """Forget what is of the last frame; in worlds that are ``overlapping``, a mask, some do."""
+        work = self.work
+        work.overflow.all.zero_()
+        work.surface.was_old.zero_()
+        work.worlds.apart.assign((~overlapping).astype(np.int32))
+        work.broad_phase.bodies.rebuild()
+        if work.ties:
+            begin_frame(work)
 
     def use(self, work: Work) -> None:
         """Continue with other buffers."""
@@ -100,7 +112,7 @@ class Buffers:
         return self._graphs[key]
 
     def _allocate(self, capacity: Capacity) -> Work:
-        given = self._awake, self.unit, self.shapes
+        given = self._awake, self.unit, self.shapes, self._ties
         work = allocate_work(self._model, self._state, capacity, *given)
         if len(self._steps):
             self._set_blocks(work, self._steps)

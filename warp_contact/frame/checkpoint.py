@@ -15,13 +15,17 @@ FORMAT = 9
 
 def fingerprint(model: Model, *settings) -> str:
     """Digest of all that must be the same for a run to continue with the same bits."""
-    digest = hashlib.sha256(repr((FORMAT, model.gravity, settings)).encode())
+    digest = hashlib.sha256(repr((FORMAT, settings)).encode())
     arrays = [model.body_vert, model.body_world, model.tets, model.mass, model.inv_mass]
-    arrays += [model.plane_n, model.plane_h, model.friction]
+    arrays += [model.plane_n, model.plane_h]
     for elements in model.elements:
         digest.update(elements.kernels.__name__.encode())
         arrays += [elements.tet, elements.param]
     digest.update(model.rest.tobytes())
+    if model.ties:
+        digest.update(repr(model.ties.labels).encode())
+        for array in (a for a in vars(model.ties).values() if isinstance(a, np.ndarray)):
+            digest.update(array.tobytes())
     for solid in filter(None, model.solids):
         digest.update(np.array([solid.mass, *solid.centre, *solid.inertia.ravel()]).tobytes())
     for array in arrays:

@@ -17,6 +17,7 @@ class FrameStart:
         self._warm = warm_start.copied(work.warm)
         self._damping, self._scaled = (damping.copied(work.damping) for _ in range(2))
         self._forces = contact_forces.copied(work.forces)
+        self._ties = work.ties.copied() if work.ties else None
 
     def keep(self, state: State, work: Work) -> None:
         """Keep what is now; memory is allocated only where buffers have grown."""
@@ -28,6 +29,7 @@ class FrameStart:
         warm_start.copy(self._warm, work.warm)
         damping.keep(self._damping, work.damping)
         contact_forces.copy(self._forces, work.forces)
+        self._ties = work.ties.copied() if work.ties else None
 
     def go_back(self, state: State, work: Work) -> None:
         """Restore the state and the warm start; ``work`` may have more room than there was.
@@ -38,6 +40,8 @@ class FrameStart:
         wp.copy(state.v, self._v)
         warm_start.copy(work.warm, self._warm)
         damping.copy(work.damping, self._damping)
+        if work.ties:
+            work.ties.copy(self._ties)
         work.broad_phase.stale.fill_(1)
 
     def begin_steps(self, work: Work) -> None:

@@ -59,6 +59,12 @@ def choose(
         if obstacle:
             raise ValueError(f"body '{rigid}' is rigid and takes implicit steps: {obstacle}")
         return Integrator(True, f"body '{rigid}' is rigid{_beside(model)}")
+    if model.ties:
+        name = f"attachment '{model.ties.labels[0]}'"
+        if obstacle or wanted == "explicit":
+            remedy = obstacle or "take integrator='implicit'"
+            raise ValueError(f"{name} needs implicit steps: {remedy}")
+        return Integrator(True, f"{name} needs them{_beside(model)}")
     if wanted == "explicit":
         return Integrator(False, "the default")
     if wanted == "implicit":

@@ -18,6 +18,8 @@ def values_of(stepper: Stepper) -> dict[str, np.ndarray]:
     groups |= {"warm": warm_start.values(work.warm), "damping": damping.values(work.damping)}
     groups["room"] = {"capacity": np.array(astuple(work.capacity))}
     groups["wrench"] = stepper.wrench.values()
+    if work.ties:
+        groups["ties"] = work.ties.values()
     if sleeping:
         groups["sleeping"] = sleeping.values(work)
     return checkpoint.ungroup(groups)
@@ -32,5 +34,7 @@ def restore(stepper: Stepper, values: dict[str, np.ndarray]) -> None:
     damping.restore(stepper.work.damping, checkpoint.group(values, "damping"))
     wrench = checkpoint.group(values, "wrench")
     stepper.wrench.restore(wrench["last"], wrench["next"])
+    if stepper.work.ties:
+        stepper.work.ties.restore(**checkpoint.group(values, "ties"))
     if stepper.sleeping:
         stepper.sleeping.restore(checkpoint.group(values, "sleeping"), stepper.work)

@@ -6,7 +6,8 @@ change by the motion that is stopped. A body that creeps slower than ``STILL`` i
 stopped too, unless moving fixed vertices drive it. ``Simulation.set_velocity`` wakes a body; a
 small velocity written into ``Simulation.state`` is lost on a sleeping one.
 
-Only for scenes with gravity: a body that stays in place despite its weight is supported.
+Only under gravity: a body that stays in place despite its weight is supported, else it may be in
+free flight.
 """
 
 import math
@@ -20,6 +21,7 @@ from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.frame.turns import Turns
 from warp_contact.kernels.motion import sleeping as kernels
+from warp_contact.step.ties import wake_attached
 
 REST_TIME = 0.5  # s that a body has to be at rest before it may sleep
 
@@ -101,7 +103,7 @@ class Sleeping:
 
         Where all bodies of the scene do, stop everything, and return False.
         """
-        self._count_rest(state, of)
+        self._count_rest(state, of & self.model.gravity.any())
         bodies = self.awake.bodies.numpy()
         if bodies.all() and self._before.all():
             return True
@@ -160,6 +162,8 @@ class Sleeping:
             inputs=[broad.bodies.id, self.model.body_world, broad.lower, broad.upper, self._mobile],
             outputs=[self.awake.bodies, self._again],
         )
+        if work.ties:
+            wake_attached(self._mobile, self.awake.bodies, self._again, work)
 
     def _skip_frame(self, state: State, work: Work) -> None:
         state.v.zero_()

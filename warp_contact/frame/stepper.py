@@ -63,15 +63,14 @@ class Stepper:
     ):
         """Allocate what steps need on the current device; without ``shapes`` all are explicit."""
         self.fps, self.wanted, self._model, self._state = fps, wanted, model, state
-        may_sleep = sleeping and any(model.gravity)  # else a slow body may be in free flight
         self.worlds = Worlds(model)
         self.last = none_yet(self.worlds.n)
         self.first = state.x.numpy().copy(), state.v.numpy().copy()
         self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, shapes)
         self.spectrum = Spectrum(model, self.worlds, shapes)
         self._inversion = Inversion(model, self.worlds, shapes)
-        self._turns = Turns(shapes.explicit if shapes else model, self.worlds, may_sleep)
-        self.sleeping = Sleeping(model, state, fps, self._turns) if may_sleep else None
+        self._turns = Turns(shapes.explicit if shapes else model, self.worlds, sleeping)
+        self.sleeping = Sleeping(model, state, fps, self._turns) if sleeping else None
         self.buffers = Buffers(model, state, response, self._turns.awake, self.worlds, shapes)
         self.wrench = self._step_count.wrench = Wrench(shapes, model)
         self._start, self._cut = FrameStart(state, self.work), False
@@ -208,6 +207,8 @@ class Stepper:
         self.wrench.clear()
         self.spectrum.start_from({})
         forget(self.work)
+        if self.work.ties:
+            self.work.ties.mend(slice(None))
         if self.sleeping:
             self.sleeping.wake_all(self.last.overlapping < 0, self.work)
 
@@ -257,10 +258,7 @@ class Stepper:
         self.wrench.shift(self._model, self._state, work, lag)
         work.dt.assign(self._dt[of_vert].astype(np.float32))
         self.wrench.begin(self._model, self._state, work)
-        work.overflow.all.zero_()
-        work.surface.was_old.zero_()
-        work.worlds.apart.assign((~self._overlapping).astype(np.int32))
-        work.broad_phase.bodies.rebuild()
+        self.buffers.begin_frame(self._overlapping)
         graph = self.buffers.graph(damping_stages, bool(self._overlapping.any()))
         for count, begun, looked in segments(self._n, in_parts, PART):
             self._turns.begin(begun, self._dt, work, self._start)

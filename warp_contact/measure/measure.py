@@ -55,7 +55,8 @@ class Measure:
         unheld: surface vertices in another body or below a plane, by more than 0.01 of a mean edge,
             that had no contact in the last step
         unsolved: how often the impulses or the closure of a world ran out of sweeps in the last
-            frame, while a contact still approached or overlapped by more than 1e-4 of an edge
+            frame, while a contact still approached or overlapped by more than 1e-4 of an edge, or
+            points of an attachment were that far apart after a step
         forces: mean contact force of the frame between two bodies, by their labels [N]
     """
 

@@ -8,6 +8,7 @@ import warp as wp
 from warp_contact.data.model import Elements, Model, Solid
 from warp_contact.data.state import State
 from warp_contact.scene import placement
+from warp_contact.scene.attachments import lay_out
 from warp_contact.scene.materials import Rigid
 from warp_contact.scene.scene import Body, Scene
 
@@ -32,7 +33,8 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         materials=tuple(body.material for body in bodies),
         solids=tuple(_solid(body) for body in bodies),
         elements=_elements(scene, tet0),
-        gravity=scene.gravity,
+        gravity=np.array(scene.gravity),
+        g=wp.array([scene.gravity], dtype=wp.vec3),
         friction=_floats(_friction(scene)),
         n_body=len(bodies),
         n_vert=len(x),
@@ -45,6 +47,7 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         **_neighbours(bodies, len(x)),
         plane_n=wp.array(np.array([n for n, _ in scene.planes]).reshape(-1, 3), dtype=wp.vec3),
         plane_h=_floats([h for _, h in scene.planes]),
+        ties=lay_out(scene.attachments, scene.bodies),
     )
     return model, State(x=wp.array(x, dtype=wp.vec3), v=wp.array(v, dtype=wp.vec3))
 

@@ -1,48 +1,20 @@
 """A scene: bodies of tets with their materials, half-spaces, gravity and friction."""
 
 import re
-from dataclasses import dataclass, field
-from typing import Any
+from numbers import Integral
 
 import numpy as np
 
 from warp_contact import checks
-from warp_contact.scene import placement
+from warp_contact.scene import attachments, placement
+from warp_contact.scene.attachments import Attachment
+from warp_contact.scene.body import Body
 from warp_contact.scene.materials import Rigid
 from warp_contact.scene.mesh import TetMesh
 from warp_contact.scene.surface import Surface
 from warp_contact.scene.topology import HUGE
 
 PLANE = re.compile(r"plane\d+")  # names of half-spaces in measurements
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """One deformable body, as placed in the scene.
-
-    Attributes:
-        index: its place in the scene
-        label: its name, unique in the scene
-        mesh: rest shape
-        material: constitutive model
-        x: initial positions [m], shape (n, 3)
-        v: initial velocities [m/s], shape (n, 3)
-        fixed: which vertices follow a prescribed velocity, shape (n,), bool
-        world: bodies of different worlds never touch
-        friction: its Coulomb coefficient, None for that of the scene
-        render: surface to draw in place of that of its tets, in the frame of the mesh, or None
-    """
-
-    index: int
-    label: str
-    mesh: TetMesh
-    material: Any
-    x: np.ndarray = field(repr=False)
-    v: np.ndarray = field(repr=False)
-    fixed: np.ndarray = field(repr=False)
-    world: int
-    friction: float | None = None
-    render: Surface | None = None
 
 
 class Scene:
@@ -55,6 +27,7 @@ class Scene:
         bodies: in the order in which they were added
         planes: (outward unit normal, offset along it [m]) of each half-space
         plane_friction: the coefficient of each half-space, None for that of the scene
+        attachments: what holds bodies at each other, in the order in which they were added
     """
 
     def __init__(self, gravity=(0.0, 0.0, -9.81), friction: float = 0.3):
@@ -65,6 +38,7 @@ class Scene:
         self._labels: set[str] = set()
         self.planes: list[tuple[np.ndarray, float]] = []
         self.plane_friction: list[float | None] = []
+        self.attachments: list[Attachment] = []
 
     def __setattr__(self, name: str, value) -> None:
         """Raises ValueError for a scene that a simulation has taken over, or a wrong value."""
@@ -78,7 +52,7 @@ class Scene:
     def freeze(self) -> None:
         """Let nothing be changed or added from now on: a simulation does not see it."""
         if "_frozen" not in vars(self):
-            for name in ("bodies", "planes", "plane_friction"):
+            for name in ("bodies", "planes", "plane_friction", "attachments"):
                 setattr(self, name, tuple(getattr(self, name)))
             self._frozen = True
 
@@ -151,6 +125,60 @@ class Scene:
         friction = _coefficient(friction)
         self.planes.append((n, offset))
         self.plane_friction.append(friction)
+
+    def attach(
+        self,
+        a: Body | int | str,
+        b: Body | int | str | None = None,
+        kind: str = "weld",
+        at=None,
+        vertices=None,
+        axis=None,
+        stiffness: float | None = None,
+        breaking_force: float | None = None,
+        label: str | None = None,
+    ) -> Attachment:
+        """Hold a body at another one, as they are placed; the two do not touch each other.
+
+        Args:
+            a: the body, its index or its label
+            b: the other one; None for the world
+            kind: ``weld`` lets nothing move; ``ball`` holds a point, ``hinge`` an axis, along a
+                ``slider`` a moves straight
+            at: the point of a ball, or where the axis is [m]; of a weld of rigid bodies, by default
+                the middle of a
+            vertices: mask or ids of the vertices of a that are held, instead: one of a ball, three
+                or more of a weld. A body that deforms is welded by its vertices
+            axis: direction of a hinge or a slider, both of rigid bodies
+            stiffness: of springs in place of a hard hold, all points together [N/m]
+            breaking_force: sum of the forces of all points above which it breaks for good [N]
+            label: name, unique among attachments; by default ``attachment<index>``
+
+        Raises:
+            ValueError: naming the attachment, for what holds nothing
+        """
+        self._refuse_if_frozen("an attachment")
+        label = f"attachment{len(self.attachments)}" if label is None else label
+        label = checks.label(label, "label")
+        if any(label == other.label for other in self.attachments):
+            raise ValueError(f"attachment '{label}': another one has this label")
+        try:
+            bodies = self._body(a), None if b is None else self._body(b)
+            given = at, vertices, axis, stiffness, breaking_force
+            made = attachments.make(len(self.attachments), label, *bodies, kind, *given)
+        except ValueError as error:
+            raise ValueError(f"attachment '{label}': {error}") from None
+        self.attachments.append(made)
+        return made
+
+    def _body(self, of) -> Body:
+        """The body that is meant; raises ValueError where there is none."""
+        if isinstance(of, Integral) and not isinstance(of, bool | np.bool_):
+            of = self.bodies[of] if 0 <= of < len(self.bodies) else of
+        for body in self.bodies:
+            if of is body or (isinstance(of, str) and of == body.label):
+                return body
+        raise checks.refuse("body", of, "a body of this scene, its label or its index")
 
 
 def rotation_matrix(quaternion) -> np.ndarray:

@@ -8,7 +8,7 @@ from warp_contact import checks
 from warp_contact.data.model import Model
 from warp_contact.scene import placement
 from warp_contact.scene.pose import pose_of
-from warp_contact.scene.scene import Body, Scene, rotation_matrix
+from warp_contact.scene.scene import PLANE, Body, Scene, rotation_matrix
 from warp_contact.scene.topology import HUGE
 
 SAME = 1e-3  # of the size of a rigid body: how far its vertices may be from its shape
@@ -45,6 +45,15 @@ class Bodies:
         if isinstance(body, Body) and body is not self._scene.bodies[index]:
             raise ValueError(f"body '{body.label}' is of another scene")
         return index
+
+    def index_or_plane(self, of: Body | int | str) -> int:
+        """The number of a body, or n_body + p of plane p by its name; ValueError without it."""
+        if not isinstance(of, str) or not PLANE.fullmatch(of):
+            return self.index(of)
+        plane, n = int(of.removeprefix("plane")), self._model.n_plane
+        if plane >= n:
+            raise ValueError(f"there is no '{of}': the scene has {n} planes")
+        return self._model.n_body + plane
 
     def label(self, body: Body | int | str) -> str:
         """The label of a body."""

@@ -16,6 +16,7 @@ from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.broad_phase import edges, hashing, near, skins
 from warp_contact.kernels.broad_phase import pairs as kernels
+from warp_contact.step.ties import keep_apart
 
 
 def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
@@ -56,6 +57,8 @@ def _find(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
         _list_pairs(model, work)
     else:
         if_any(b.any_pair, _list_pairs, model, work, otherwise=partial(_list_none, work))
+    if work.ties:
+        keep_apart(model, work)
 
 
 def _list_pairs(model: Model, work: Work) -> None:

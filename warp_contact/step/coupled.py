@@ -13,7 +13,7 @@ from warp_contact.kernels.impulse import coupled as kernels
 from warp_contact.kernels.impulse import rows, touched
 from warp_contact.kernels.impulse.impulse import Limits
 from warp_contact.kernels.surface import coupled_closure as closure
-from warp_contact.step import sweeps
+from warp_contact.step import sweeps, ties
 from warp_contact.step.implicit import place
 
 TOLERANCE = 1e-4  # of an edge: an approach in a step that needs another sweep
@@ -28,13 +28,19 @@ def begin(model: Model, work: Work) -> None:
     launch_over(rows.list_touched, model.n_body, inputs=inputs, outputs=[w.touched])
     launch_over(rows.count_all, work.capacity.contacts, inputs=[c.n], outputs=[w.counted])
     _find_rows(model, work)
+    if work.ties:
+        ties.find_rows(work)
 
 
 def apply(model: Model, v: wp.array, work: Work) -> None:
     """Add the parts of the contacts to ``v``, and to the impulses of the frame."""
+    if work.ties:
+        wp.copy(work.implicit.before, v)
     _collect(model, work, work.implicit.every)
     _record(model, work)
     _add(model, v, v, work)
+    if work.ties:
+        ties.settle(model, v, work, keeps=True)
 
 
 def add_parts(model: Model, y: wp.array, work: Work, moves: wp.array) -> None:
@@ -52,6 +58,8 @@ def sweep_all(model: Model, v: wp.array, work: Work, look: int, extrapolation: f
     limits.extrapolation, limits.tolerance, limits.sweeps = extrapolation, TOLERANCE, SWEEPS
     _repeat(model, v, work, look, _solve_contacts, limits)
     _record(model, work)
+    if work.ties:
+        ties.settle(model, v, work, keeps=True)
 
 
 def close(model: Model, x: wp.array, work: Work, look: int) -> None:
@@ -62,6 +70,8 @@ def close(model: Model, x: wp.array, work: Work, look: int) -> None:
     outputs = [w.ahead, w.counted]
     launch_over(closure.begin_pushes, work.capacity.contacts, inputs=inputs, outputs=outputs)
     _repeat(model, x, work, look, _solve_gaps)
+    if work.ties:
+        ties.settle(model, x, work, keeps=False)
 
 
 def _repeat(model: Model, y: wp.array, work: Work, look: int, solve: Callable, *given) -> None:
@@ -69,7 +79,11 @@ def _repeat(model: Model, y: wp.array, work: Work, look: int, solve: Callable, *
     w = work.implicit
     wp.copy(w.before, y)
     w.impulse.zero_()
+    if work.ties:
+        work.ties.ties.since.zero_()
     _find_rows(model, work)
+    if work.ties:
+        ties.set_rows(work)
     sweeps.repeat(work, look, True, _sweep, model, y, work, solve, *given)
     _add(model, w.before, y, work)
 
@@ -91,6 +105,8 @@ def _sweep(model: Model, y: wp.array, work: Work, solve: Callable, *given) -> No
         + [w.bodies],
         outputs=[y, work.mobility.row, s.changed],
     )
+    if work.ties:
+        ties.relax(model, y, work)
 
 
 def _solve_contacts(v: wp.array, work: Work, limits: Limits) -> None:

@@ -16,7 +16,7 @@ def kick_damped(model: Model, state: State, work: Work, stages: int) -> None:
     d, inv_mass = work.damping, work.awake.inv_mass
     contacts = [d.last, d.before]
     internal_forces(model, state.x, work.awake.tets, work.f_tet)
-    forces = [model.vt_start, model.vt_corner, work.f_tet, inv_mass, wp.vec3(*model.gravity)]
+    forces = [model.vt_start, model.vt_corner, work.f_tet, inv_mass, model.g]
     if d.undamped is not None:
         inputs = [*forces, work.dt, state.x, state.v]
         wp.launch(motion.kick, model.n_vert, inputs=inputs, outputs=[work.x, d.kicked])

@@ -26,7 +26,7 @@ def kick(model: Model, state: State, work: Work) -> None:
     else:
         place(model, state.x, w)
         _rigid_part(model, w.dv, state.x, w)  # of nothing
-    inputs = [state.x, w.dv, wp.vec3(*model.gravity), work.dt, w.bodies, w.of]
+    inputs = [state.x, w.dv, model.g, work.dt, w.bodies, w.of]
     wp.launch(predict.kick, model.n_vert, inputs=inputs, outputs=[state.v])
     wp.copy(w.predicted, state.v)
     w.total.zero_()
@@ -129,7 +129,7 @@ def _find_load(model: Model, state: State, w: ImplicitWork, lacking: wp.array) -
     wp.launch(predict.difference, n, inputs=[d, v, w.z], outputs=[w.p])
     apply_stiffness(model, x, w.p, w.stiff)
     at_vertex = [model.vt_start, model.vt_corner, w.stiff]
-    inputs = [*at_vertex, w.f, lacking, wp.vec3(*model.gravity), d]
+    inputs = [*at_vertex, w.f, lacking, model.g, d]
     wp.launch(predict.load, n, inputs=inputs, outputs=[w.r])
     wp.launch(mobility.rigid_response, model.n_body, inputs=[w.r, x, d], outputs=[w.by])
     wp.launch(predict.remove_rigid, n, inputs=[x, d, w.by], outputs=[w.r])

@@ -52,7 +52,7 @@ def forget(work: Work) -> None:
     work.contacts.n_vertex.zero_()
     work.narrow_phase.n_crossing.zero_()
     work.contacts.n.zero_()
-    forget_last(work.warm)
+    forget_last(work.warm, lacking=not work.ties)  # the end of the step sets it
 
 
 def begin(model: Model, x0: wp.array, work: Work) -> None:

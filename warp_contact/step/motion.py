@@ -6,7 +6,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work
 from warp_contact.kernels.motion import motion
-from warp_contact.step import implicit
+from warp_contact.step import implicit, ties
 from warp_contact.step.damping import kick_damped
 from warp_contact.step.forces import internal_forces
 
@@ -14,6 +14,9 @@ from warp_contact.step.forces import internal_forces
 def predict(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Let forces, weight and damping act on ``state.v`` for a step; set ``work.x`` = x + h v."""
     kick(model, state, work, work.awake, damping_stages)
+    if work.ties:
+        ties.hold(model, state, work)
+        implicit.drift(model, state, work, work.x)
 
 
 def kick(model: Model, state: State, work: Work, awake: Awake, damping_stages: int = 0) -> None:
@@ -28,6 +31,8 @@ def kick(model: Model, state: State, work: Work, awake: Awake, damping_stages: i
         _kick_undamped(explicit, state, work, awake)
     if work.implicit:
         implicit.kick(work.implicit.deforming, state, work)
+        if work.ties:
+            ties.begin(state.x, work)
         implicit.drift(model, state, work, work.x)
 
 
@@ -42,7 +47,7 @@ def _kick_undamped(model: Model, state: State, work: Work, awake: Awake) -> None
         motion.kick,
         dim=model.n_vert,
         inputs=[model.vt_start, model.vt_corner, work.f_tet, awake.inv_mass]
-        + [wp.vec3(*model.gravity), work.dt, state.x, state.v],
+        + [model.g, work.dt, state.x, state.v],
         outputs=[work.x, state.v],
     )
 
@@ -54,15 +59,23 @@ def drift(model: Model, state: State, work: Work, out: wp.array) -> None:
     wp.launch(motion.advance, dim=model.n_vert, inputs=[work.dt, state.x, state.v], outputs=[out])
 
 
-def finish(model: Model, state: State, work: Work) -> None:
-    """Move ``state.x`` by ``state.v``, to the end of the step."""
+def finish(model: Model, state: State, work: Work, apart: bool = False) -> None:
+    """Move ``state.x`` by ``state.v``, to the end of the step; ``apart`` if nothing touched."""
+    if work.ties:
+        ties.hold(model, state, work)  # what contacts have moved
+        ties.make_up(model, state, work, apart)
     if work.implicit:
-        return implicit.drift(model, state, work, state.x, turned=True)
-    drift(model, state, work, state.x)
+        implicit.drift(model, state, work, state.x, turned=True)
+    else:
+        drift(model, state, work, state.x)
+    if work.ties:
+        ties.record(model, state.x, work)
 
 
 def finish_free(model: Model, state: State, work: Work) -> None:
     """The same where nothing touched: ``work.x`` is the end of the step."""
+    if work.ties:
+        return finish(model, state, work, apart=True)
     if work.implicit:
         return implicit.drift(model, state, work, state.x, turned=True)
     wp.copy(state.x, work.x)

@@ -37,5 +37,5 @@ def _find_lacking(model: Model, state: State, work: Work) -> None:
     work.worlds.open.zero_()
     implicit.multiply_change(w.deforming, state, w)
     outputs = [w.settling, work.worlds, work.warm.lacking, w.r, w.unsettled]
-    inputs = [w.bodies, w.total, w.ap]
+    inputs = [w.bodies, w.total, w.ap, work.ties.attached if work.ties else w.every]
     wp.launch(kernels.find_lacking, model.n_body, inputs=inputs, outputs=outputs)

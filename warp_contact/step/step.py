@@ -49,5 +49,5 @@ def in_contact(model: Model, state: State, work: Work, iterations: int) -> None:
 
 def in_free_flight(model: Model, state: State, work: Work) -> None:
     """The rest of the step where no bodies can touch."""
-    finish_free(model, state, work)
     impulse.forget(work)
+    finish_free(model, state, work)

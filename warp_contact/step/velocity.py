@@ -20,6 +20,7 @@ from warp_contact.step.detection import detect
 from warp_contact.step.motion import kick
 from warp_contact.step.other_responses import push_half_step
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.step.ties import hold_still
 
 
 def velocities_now(
@@ -36,6 +37,8 @@ def velocities_now(
         work.dt.assign((0.5 * dt).astype(np.float32))
         work.overflow.all.zero_()
         kick(model, now, work, work.awake)
+        if work.ties:
+            hold_still(model, now, work)
         broad_phase.refresh(model, state.x, work.x, work)
         if_any(work.broad_phase.any_pair, answer, model, now, work)
     return now.v

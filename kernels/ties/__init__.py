@@ -1,0 +1,1 @@
+"""Attachments between bodies: points that are tied to each other."""

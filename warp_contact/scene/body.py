@@ -1,0 +1,38 @@
+"""A body of a scene."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One deformable body, as placed in the scene.
+
+    Attributes:
+        index: its place in the scene
+        label: its name, unique in the scene
+        mesh: rest shape
+        material: constitutive model
+        x: initial positions [m], shape (n, 3)
+        v: initial velocities [m/s], shape (n, 3)
+        fixed: which vertices follow a prescribed velocity, shape (n,), bool
+        world: bodies of different worlds never touch
+        friction: its Coulomb coefficient, None for that of the scene
+        render: surface to draw in place of that of its tets, in the frame of the mesh, or None
+    """
+
+    index: int
+    label: str
+    mesh: TetMesh
+    material: Any
+    x: np.ndarray = field(repr=False)
+    v: np.ndarray = field(repr=False)
+    fixed: np.ndarray = field(repr=False)
+    world: int
+    friction: float | None = None
+    render: Surface | None = None

@@ -74,7 +74,7 @@ def find_lacking(
     # out, added to
     bodies: wp.array[int],  # (1,) that need a pass
 ):
-    """One thread per body: what it lacks, and whether that needs a pass; not where it is attached."""
+    """One thread per body: what it lacks, and whether that needs a pass; of attached ones none."""
     b = wp.tid()
     first = d.body_vert[b]
     last = d.body_vert[b + 1]

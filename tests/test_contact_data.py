@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 import warp_contact as wc
 
@@ -149,3 +150,52 @@ def test_slip_is_the_motion_along_the_surface(device):
     # The base widens a little as the block sinks into its weight.
     np.testing.assert_allclose(c.slip, np.tile(v, (len(c), 1)), atol=0.02)
     np.testing.assert_allclose(np.einsum("ci,ci->c", c.slip, c.normal), 0.0, atol=1e-6)
+
+
+FIELDS = "bodies", "vertices", "weights", "point", "normal", "gap", "slip"
+FIELDS += "normal_impulse", "friction_impulse", "normal_force", "friction_force"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_contact_arrays_hold_the_contacts_and_copy_nothing_to_the_host(device, monkeypatch, kind):
+    scene = wc.Scene(friction=0.4)
+    scene.add_plane((0.0, 0.0, 1.0))
+    for k, world in enumerate((0, 0, 3)):  # the lone one takes other steps
+        height = 0.4999 * EDGE + 0.999 * k * EDGE * (world == 0)
+        stiff = wc.NeoHookean(2e5 * (1 + 3 * world), 0.3, DENSITY, 4e-3)
+        at = (0.02 * k, 0.01 * k, height)
+        scene.add_body(wc.box(EDGE, 2 + k % 2), stiff, at, velocity=(0.1, 0.2, 0.0), world=world)
+    sim = wc.Simulation(scene, device=str(device), integrator=kind)
+    before = sim.contact_arrays()
+    assert not before.n.numpy()[0]
+    for _ in sim.frames(4):
+        pass
+    with monkeypatch.context() as m:
+        m.setattr(wp.array, "numpy", lambda *_: pytest.fail("copied to the host"))
+        got = sim.contact_arrays()
+    want = sim.contacts()
+    n = int(got.n.numpy()[0])
+    assert n == len(want) and {0, 1, 2, 3} <= {*want.bodies.ravel()}
+    # The host sums in float64: float32 rounds by 6e-8 of what is summed.
+    scale = {"gap": 0.1, "point": 0.2, "slip": 0.3}
+    for name in FIELDS:
+        each, array = getattr(want, name), getattr(got, name).numpy()[:n]
+        worst = 3e-7 * max(np.abs(each).max(), scale.get(name, 0.0))
+        np.testing.assert_allclose(array, each, rtol=0.0, atol=worst, err_msg=name)
+
+
+@wp.kernel
+def add_up(contacts: wc.ContactArrays, total: wp.array[wp.vec3]):
+    c = wp.tid()
+    if c < contacts.n[0] and contacts.bodies[c][0] == 0:
+        force = contacts.normal_force[c] * contacts.normal[c] + contacts.friction_force[c]
+        wp.atomic_add(total, 0, force)
+
+
+def test_a_kernel_of_a_user_reads_the_contacts(device):
+    sim = slope(0.2, device, "explicit")
+    arrays, total = sim.contact_arrays(), wp.zeros(1, dtype=wp.vec3)
+    wp.launch(add_up, dim=len(arrays.gap), inputs=[arrays], outputs=[total])
+    c = sim.contacts()
+    want = (c.normal_force[:, None] * c.normal + c.friction_force).sum(axis=0)
+    np.testing.assert_allclose(total.numpy()[0], want, atol=1e-5 * WEIGHT)  # sums in any order

@@ -27,7 +27,7 @@ MAY = {  # room: those that it may import, beside itself
     "usd": {"checks", "files"},
     "picture": {"kernels", "usd", "checks"},
     "between_frames": {"data", "scene", "frame", "measure", "exclusive", "checks"},
-    "contact_data": {"data", "scene", "frame", "measure"},
+    "contact_data": {"data", "scene", "frame", "measure", "exclusive"},
     "joined": {"data", "scene", "frame", "exclusive", "checks"},
     "simulation": {"data", "scene", "step", "frame", "measure", "between_frames"}
     | {"contact_data", "joined", "errors", "progress", "exclusive", "checks"},

@@ -2,6 +2,7 @@
 
 from warp_contact import interrupts  # noqa: F401  first, as the others take a second
 from warp_contact.errors import SimulationError
+from warp_contact.measure.contact_arrays import ContactArrays
 from warp_contact.measure.contact_data import Contacts, PairForce
 from warp_contact.measure.measure import Measure
 from warp_contact.runs import sweep
@@ -19,6 +20,7 @@ from warp_contact.usd.writer import UsdWriter
 __all__ = [
     "Attachment",
     "Body",
+    "ContactArrays",
     "ContactSurface",
     "Contacts",
     "Corotated",

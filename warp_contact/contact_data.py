@@ -4,8 +4,10 @@ import numpy as np
 
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
+from warp_contact.exclusive import exclusively
 from warp_contact.frame.stepper import Stepper
 from warp_contact.measure import contact_data
+from warp_contact.measure.contact_arrays import ContactArrays, ContactRows
 from warp_contact.measure.contact_fields import contact_fields
 from warp_contact.measure.measure import Meter
 from warp_contact.scene.scene import Body
@@ -19,9 +21,11 @@ class ContactData:
     frame: int
     model: Model
     state: State
+    device: object
     _bodies: Bodies
     _stepper: Stepper
     _meter: Meter
+    _rows: ContactRows | None = None
 
     def contacts(self) -> contact_data.Contacts:
         """Contacts of the last step, at the present positions: points, normals, forces, slip.
@@ -30,6 +34,19 @@ class ContactData:
         """
         s = self._stepper
         return contact_data.contacts(self.state, s.work, s.last_dt)
+
+    def contact_arrays(self) -> ContactArrays:
+        """The same as Warp arrays on the device, of which nothing is copied to the host.
+
+        Only the first ``n[0]`` entries of each are contacts. They are overwritten by the next call,
+        and out of date after the next frame.
+        """
+        s = self._stepper
+        with exclusively(self.device):
+            capacity = len(s.work.contacts.record)
+            if self._rows is None or self._rows.capacity != capacity:
+                self._rows = ContactRows(capacity, self.model.n_vert)
+            return self._rows.fill(self.state, s.work, s.last_dt)
 
     def forces(self) -> dict[tuple[str, str], contact_data.PairForce]:
         """Mean contact force of the last frame on the first body of each pair that touched.

@@ -57,7 +57,7 @@ ONLY_IN = {  # packages that the solver does without
     | {"picture/textures"},
     "PIL": {"picture/files"},
     "meshio": {"scene/files", "scene/reading", "scene/reading_faces"},
-    "matplotlib": set(),
+    "matplotlib": {"picture/plot"},
 }
 # Folders whose files and functions are short.
 SIZED = ("warp_contact", "kernels", "scenes", "tests", "tools")

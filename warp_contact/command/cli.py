@@ -1,4 +1,4 @@
-"""The command line: ``warp-contact run | scenes | info | render | validate``.
+"""The command line: ``warp-contact run | scenes | info | plot | render | validate``.
 
 Exit codes: 0 done, 1 failed on the way, 2 wrong usage or input, 128 + its number after a signal
 (130 interrupted, 143 terminated, 129 hung up). An error is one line on stderr; ``--debug`` before
@@ -18,6 +18,7 @@ import warp as wp
 from warp_contact import __version__, interrupts
 from warp_contact.command import commands, run
 from warp_contact.errors import SimulationError, UsageError
+from warp_contact.picture.plot import PANELS
 from warp_contact.simulation import INTEGRATORS
 
 
@@ -86,6 +87,7 @@ def parser() -> argparse.ArgumentParser:
     command = group.add_parser("info", help="what is in a USD file or a mesh file")
     command.add_argument("file", metavar="FILE", help="run directory, USD file or tet mesh")
     command.set_defaults(command=commands.info)
+    add_plot(group)
     add_render(group)
     command = group.add_parser("validate", help="check a USD file")
     command.add_argument("file", metavar="DIR", help="run directory or USD file")
@@ -133,6 +135,17 @@ def add_run(group) -> None:
     add("--quiet", action="store_true", help="no progress line and no summary")
     add("--flatten", action="store_true", help="also write everything into one .usdc")
     command.set_defaults(command=run.run)
+
+
+def add_plot(group) -> None:
+    """The arguments of ``plot``."""
+    command = group.add_parser("plot", help="draw the metrics of a run over time")
+    add = command.add_argument
+    add("file", metavar="DIR", help="run directory, or a metrics.jsonl")
+    add("--what", nargs="+", choices=PANELS, default=list(PANELS), help="panels; default: all")
+    add("--out", type=place, metavar="FILE", help="default: metrics.png in DIR; also .svg, .pdf")
+    add("--quiet", action="store_true", help="do not name the file")
+    command.set_defaults(command=commands.plot)
 
 
 def add_render(group) -> None:

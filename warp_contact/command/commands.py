@@ -8,6 +8,7 @@ import warp as wp
 
 from warp_contact.command.warned import warned
 from warp_contact.errors import UsageError
+from warp_contact.picture import plot as figures
 from warp_contact.picture.files import animate
 from warp_contact.picture.render import render
 from warp_contact.scene.files import in_child, regular
@@ -100,6 +101,20 @@ def mesh_info(path: Path) -> int:
         print(f"pieces   {mesh.n_pieces}, {len(mesh.seams)} pairs of vertices in the same place")
     print(f"size     {' x '.join(f'{d:.6g}' for d in high - low)} m, volume {mesh.volume:.6g} m^3")
     print(f"quality  {mesh.quality.min():.3f} to {mesh.quality.max():.3f} (1: regular, 0: flat)")
+    return 0
+
+
+def plot(args) -> int:
+    """Draw the metrics of a run."""
+    path = Path(args.file)
+    if not path.exists():
+        raise UsageError(f"no such file: {path}")
+    lines = figures.read_metrics(path)
+    folder = path.resolve() if path.is_dir() else path.resolve().parent
+    out = args.out or folder / "metrics.png"
+    figures.plot(lines, out, args.what, folder.name)
+    if not args.quiet:
+        print(out)
     return 0
 
 

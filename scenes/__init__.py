@@ -1,4 +1,7 @@
-"""The scenes of the paper, one file each: constants with units and ``build()``."""
+"""The scenes of the paper, one file each: constants with units and ``build()``.
+
+``examples`` holds scripts to start from.
+"""
 
 if __name__ != "warp_contact.scenes":
     raise ImportError("import this package as warp_contact.scenes")
@@ -10,7 +13,7 @@ from types import ModuleType
 
 def names() -> list[str]:
     """The scenes there are, in alphabetical order."""
-    return sorted(module.name for module in iter_modules(__path__))
+    return sorted(module.name for module in iter_modules(__path__) if not module.ispkg)
 
 
 def load(name: str) -> ModuleType:

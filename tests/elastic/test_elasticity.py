@@ -1,14 +1,15 @@
-"""neo_hookean.py and corotated.py: derivatives, small strain, inversion."""
+"""Isotropic models, one of them an example: derivatives, small strain, inversion."""
 
 import numpy as np
 import pytest
 import warp as wp
 
 from warp_contact.scene.materials import Corotated, NeoHookean
+from warp_contact.scenes.examples.material import StVenantKirchhoff
 from warp_contact.step import forces
 
 E, NU, RHO = 1e5, 0.3, 1000.0  # [Pa], [-], [kg/m^3]
-MODELS = [NeoHookean, Corotated]
+MODELS = [NeoHookean, Corotated, StVenantKirchhoff]
 EPS = 1.2e-7  # float32
 
 
@@ -32,6 +33,10 @@ def density(material, f: np.ndarray) -> np.ndarray:
     """Energy density [Pa] straight from the formula, in float64."""
     mu, lam = material.lame()
     j = np.linalg.det(f)
+    if isinstance(material, StVenantKirchhoff):
+        e = (np.swapaxes(f, -1, -2) @ f - np.eye(3)) / 2.0
+        trace = np.trace(e, axis1=-2, axis2=-1)
+        return mu * (e * e).sum((-1, -2)) + lam / 2.0 * trace**2 + (lam + mu) * barrier(j)
     if isinstance(material, NeoHookean):
         shear = mu / 2.0 * ((f * f).sum((-1, -2)) - 3.0) - mu * (j - 1.0)
         return shear + (lam + mu) * ((j - 1.0) ** 2 / 2.0 + barrier(j))

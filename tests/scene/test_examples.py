@@ -19,7 +19,7 @@ from warp_contact.scenes.examples import (
     weight,
 )
 
-FOLDER = Path(scenes.__path__[0]) / "examples"
+FOLDER = Path(__file__).resolve().parents[2] / "scenes" / "examples"
 FILES = sorted(FOLDER.glob("[!_]*.py"))
 
 

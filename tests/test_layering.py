@@ -56,6 +56,7 @@ ONLY_IN = {  # packages that the solver does without
     "pxr": {"scene/files", "scene/reading", "scene/reading_faces", "usd", "picture/render"}
     | {"picture/textures"},
     "PIL": {"picture/files"},
+    "imageio_ffmpeg": {"picture/files"},
     "meshio": {"scene/files", "scene/reading", "scene/reading_faces"},
     "matplotlib": {"picture/plot"},
 }

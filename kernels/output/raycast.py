@@ -12,10 +12,10 @@ Hacking the shadow terminator). Otherwise shadows would show the facets of a coa
 import warp as wp
 
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.output.cut import FAR, kept, meets
 
 wp.set_module_options(OPTIONS)
 
-FAR = wp.constant(1.0e30)
 GLOW = wp.constant(0.3)  # light from what occludes the sky, as a share of that from below [-]
 GOLDEN = wp.constant(0.6180339887498949)
 
@@ -36,6 +36,7 @@ class View:
 @wp.struct
 class Light:
     mesh: wp.uint64  # the triangles that occlude it
+    cut: wp.vec4  # [-] and [m], normal and offset of a plane: beyond it nothing is there
     sun: wp.vec3  # unit, toward the sun [-]
     sun_power: float  # [-]
     sun_size: float  # tangent of the half angle of its disc [-]
@@ -91,7 +92,7 @@ def sun_light(p: wp.vec3, n: wp.vec3, light: Light, draw: Draw) -> float:
         u = fraction((float(draw.first + k) + 0.5) / float(draw.total) + draw.shift[1])
         v = wp.TAU * fraction(float(draw.first + k) * GOLDEN + draw.shift[0])
         d = light.sun + light.sun_size * wp.sqrt(u) * (wp.cos(v) * a + wp.sin(v) * b)
-        if not wp.mesh_query_ray_anyhit(light.mesh, p, wp.normalize(d), FAR):
+        if not meets(light.mesh, light.cut, p, wp.normalize(d), FAR):
             seen += 1.0 / float(draw.count)
     return seen
 
@@ -106,7 +107,7 @@ def sky_light(p: wp.vec3, n: wp.vec3, light: Light, draw: Draw) -> wp.vec3:
         v = wp.TAU * fraction(float(draw.first + k) * GOLDEN + draw.shift[1])
         d = wp.sqrt(u) * (wp.cos(v) * a + wp.sin(v) * b) + wp.sqrt(1.0 - u) * n
         s = 0.5 + 0.5 * d[2]
-        if wp.mesh_query_ray_anyhit(light.mesh, p, d, light.reach):
+        if meets(light.mesh, light.cut, p, d, light.reach):
             e += GLOW * light.bounce / float(draw.count)
         else:
             e += (s * light.sky + (1.0 - s) * light.bounce) / float(draw.count)
@@ -178,13 +179,22 @@ def body_color(
     c = hit.u * color[wp.mesh_get_index(light.mesh, 3 * t)]
     c += hit.v * color[wp.mesh_get_index(light.mesh, 3 * t + 1)]
     c += w * color[wp.mesh_get_index(light.mesh, 3 * t + 2)]
-    pixel = 2.0 * hit.t * wp.length(view.up) / float(view.height)
+    pixel = 2.0 * wp.length(p - view.eye) * wp.length(view.up) / float(view.height)
     c *= 1.0 - view.wire * wp.clamp(1.5 - edge_distance(p, xa, xb, xc) / pixel, 0.0, 1.0)
 
     sun = light.sun_power * sun_light(o, n, light, draw)
     shine = wp.max(wp.dot(n, wp.normalize(light.sun - d)), 0.0)
     e = wp.vec3(sun * wp.max(wp.dot(n, light.sun), 0.0)) + sky_light(o, n, light, draw)
     return wp.cw_mul(c, e) + wp.vec3(0.08 * sun * wp.pow(shine, 30.0))
+
+
+@wp.func
+def cut_color(c: wp.vec3, light: Light) -> wp.vec3:
+    """The inside of a body, of colour c, where the plane cuts it: nothing stands before it."""
+    n = wp.vec3(light.cut[0], light.cut[1], light.cut[2])
+    s = 0.5 + n[2] / 3.0  # mean of that of ``sky_light``
+    sun = light.sun_power * wp.max(wp.dot(n, light.sun), 0.0)
+    return wp.cw_mul(c, wp.vec3(sun) + s * light.sky + (1.0 - s) * light.bounce)
 
 
 @wp.func
@@ -243,6 +253,7 @@ def cast(
     plane: wp.array[wp.vec4],  # (n_plane,) [-] and [m], normal and offset
     color: wp.array[wp.vec3],  # (n_vert,) [-], linear
     normal: wp.array[wp.vec3],  # (3 n_tri,) [-], of each corner
+    inside: wp.array[wp.vec3],  # (n_vert,) [-], linear, of what is within the body of a vertex
     # out
     picture: wp.array[wp.vec3],  # (height width,) [-], sRGB
 ):
@@ -262,14 +273,19 @@ def cast(
         v = 1.0 - 2.0 * down / float(view.height)
         d = wp.normalize(view.forward + u * view.right + v * view.up)
         draw.first = s * view.rays
-        hit = wp.mesh_query_ray(light.mesh, view.eye, d, FAR)
-        limit = wp.where(hit.result, hit.t, FAR)
+        way = kept(light.cut, view.eye, d)
+        start = view.eye + wp.where(way[0] < FAR, way[0], 0.0) * d
+        hit = wp.mesh_query_ray(light.mesh, start, d, way[1] - way[0])
+        is_cut = hit.result and way[0] > 0.0 and wp.dot(hit.normal, d) > 0.0
+        limit = wp.where(hit.result, way[0] + wp.where(is_cut, 0.0, hit.t), FAR)
         ground = nearest_plane(plane, view.eye, d, limit)
         if ground[1] >= 0.0:
             k = int(ground[1])
             n = wp.vec3(plane[k][0], plane[k][1], plane[k][2])
             p = view.eye + ground[0] * d
             sum += ground_color(p, d, n, light, draw)
+        elif is_cut:
+            sum += cut_color(inside[wp.mesh_get_index(light.mesh, 3 * hit.face)], light)
         elif hit.result:
             sum += body_color(hit, d, color, normal, light, view, draw)
         else:

@@ -156,6 +156,9 @@ def test_info_render_and_validate_read_a_run(tmp_path, scene, capsys):
     named = capsys.readouterr().out.splitlines()
     assert [os.path.basename(path) for path in named] == ["000000.png", "000001.png", "out.webp"]
     assert all(os.path.getsize(path) > 0 for path in named)
+    cut = ["--cut", "0", "0", "0", "1"]
+    assert cli.main(["render", out, "--size", "32x18", *cut]) == 1
+    assert "cut [0.0, 0.0, 0.0, 1.0]: give a normal that is not zero" in complaint(capsys)
     assert cli.main(["render", out, "--frames", "5"]) == 2
     assert "no frame 5: the file has 0 to 1" in complaint(capsys)
     assert cli.main(["validate", out]) == 0

@@ -117,6 +117,57 @@ def test_a_body_darkens_the_ground_below_it():
     assert is_red(renderer.picture(points, colors, below)).any()
 
 
+def test_a_plane_cuts_a_sphere_and_shows_its_inside():
+    points, tris = sphere()
+    fov = 2.0 * np.degrees(np.arctan(2 / 40.0))
+    colors, blue = np.tile(RED, (len(points), 1)), np.tile([[0.02, 0.02, 0.6]], (len(points), 1))
+
+    def view(cut, eye):
+        renderer = Renderer(tris, points, size=(100, 100), samples=1, rays=2, cut=cut)
+        camera = Camera(np.array([eye, 0.0, 0.0]), np.zeros(3), fov)
+        picture = renderer.picture(points, colors, camera, inside=blue).astype(int)
+        return is_red(picture), picture[..., 2] > picture[..., 0] + 60
+
+    half = (2.0, 0.0, 0.0), 1.0  # x > 0.5 is cut off: a disc of radius 0.87
+    outside, inside = view(half, 40.0)
+    # 24 and 48 facets around leave 1 % of the area out, and half a pixel of edge is 2 %.
+    assert inside.sum() * 0.04**2 == pytest.approx(0.75 * np.pi, rel=0.04)
+    # Its middle is 39.5 m away, that of the ring around it 40 m.
+    assert outside.sum() * 0.04**2 == pytest.approx(0.25 * np.pi, rel=0.1)
+    behind, inside = view(half, -40.0)
+    assert behind.sum() * 0.04**2 == pytest.approx(np.pi, rel=0.025) and not inside.any()
+    assert not np.any(view(((1.0, 0.0, 0.0), -1.5), 40.0))
+    whole, inside = view(((1.0, 0.0, 0.0), 1.5), 40.0)
+    assert whole.sum() == behind.sum() and not inside.any()
+
+
+def test_what_is_cut_off_throws_no_shadow():
+    points, tris = sphere()
+    points = points + np.float32([0.0, 0.0, 1.3])
+    camera = Camera(np.array([0.0, -12.0, 9.0]), np.zeros(3))
+    ground = [(np.array([0.0, 0.0, 1.0]), 0.0)]
+    colors = np.tile(RED, (len(points), 1))
+    far, place = points + np.float32([0.0, 0.0, 100.0]), (np.zeros(3), 4.0)
+    settings = {"size": (48, 36), "samples": 1, "rays": 4}
+    empty = Renderer(tris, points, ground, **settings).picture(far, colors, camera, *place)
+    for n, d, whole in (((0.0, 0.0, 1.0), 0.2, False), ((0.0, 0.0, 1.0), 3.0, True)):
+        renderer = Renderer(tris, points, ground, **settings, cut=(n, d))
+        picture = renderer.picture(points, colors, camera, *place)
+        assert (np.abs(picture.astype(int) - empty).max() > 40) == whole
+
+
+@pytest.mark.parametrize("cut", [(0.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0, np.nan)])
+def test_a_cut_that_is_no_plane_is_refused(cut, tmp_path):
+    with pytest.raises(ValueError, match="cut"):
+        render.render(stage_of(*sphere(4), RED), tmp_path, cut=cut)
+
+
+def test_the_inside_of_a_mesh_has_the_colour_of_most_of_its_points():
+    drawing = render.Drawing((), (3, 2), np.zeros((0, 3)))
+    colors = np.array([[0.1] * 3, [0.1] * 3, [0.9] * 3, [0.5] * 3, [0.5] * 3])
+    np.testing.assert_array_equal(drawing.middle(colors)[:, 0], [0.1, 0.1, 0.1, 0.5, 0.5])
+
+
 def test_screen_is_the_inverse_of_linear():
     for code in ("000000", "0a141e", "4c86b8", "ffffff"):
         expected = np.frombuffer(bytes.fromhex(code), np.uint8) / 255.0
@@ -171,6 +222,21 @@ def test_png_needs_no_library(tmp_path, monkeypatch):
     assert struct.unpack(">II", data[16:24]) == (5, 7)
     (length,) = struct.unpack(">I", data[33:37])
     assert len(zlib.decompress(data[41 : 41 + length])) == 7 * (1 + 3 * 5)
+
+
+def test_a_film_holds_every_picture_also_of_odd_size(tmp_path, monkeypatch):
+    for k in range(3):
+        files.write_png(tmp_path / f"{k}.png", np.full((9, 15, 3), 80 * k, np.uint8))
+    pictures = sorted(tmp_path.glob("*.png"))
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "imageio_ffmpeg", None)
+        with pytest.raises(ImportError, match=r"pip install 'warp_contact\[video\]'"):
+            files.animate(pictures, tmp_path / "all.mp4")
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    files.animate(pictures, tmp_path / "all.mp4", 25.0)
+    assert ffmpeg.count_frames_and_secs(str(tmp_path / "all.mp4"))[0] == 3
+    with pytest.raises(OSError, match=r"cannot write .*all\.mp4: ffmpeg says "):
+        files.animate(pictures, tmp_path / "absent" / "all.mp4")
 
 
 @pytest.mark.parametrize("kind", ["webp", "gif"])

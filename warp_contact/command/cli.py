@@ -158,10 +158,13 @@ def add_render(group) -> None:
     add("--out", type=place, metavar="DIR", help="default: pictures/ beside the USD file")
     add("--webp", action="store_true", help="join the pictures into an animated WebP too")
     add("--gif", action="store_true", help="join the pictures into an animated GIF too")
+    add("--mp4", action="store_true", help="join the pictures into an MP4 too")
     add("--eye", nargs=3, type=float, metavar=("X", "Y", "Z"), help="place of the camera [m]")
     add("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="where it looks [m]")
     add("--samples", type=count, default=2, help="rays along a pixel's side; default: %(default)s")
     add("--wire", type=float, default=0.0, metavar="S", help="darken triangle edges, 0 to 1")
+    cut = "draw nothing of bodies where (NX, NY, NZ) . x > D"
+    add("--cut", nargs=4, type=float, metavar=("NX", "NY", "NZ", "D"), help=cut)
     add("--device", metavar="NAME", help="cpu, cuda:0, ...; default: Warp's")
     add("--quiet", action="store_true", help="do not name the files")
     command.set_defaults(command=commands.draw)

@@ -9,7 +9,7 @@ import warp as wp
 from warp_contact.command.warned import warned
 from warp_contact.errors import UsageError
 from warp_contact.picture import plot as figures
-from warp_contact.picture.files import animate
+from warp_contact.picture.files import NEEDS, animate
 from warp_contact.picture.render import render
 from warp_contact.scene.files import in_child, regular
 from warp_contact.scene.mesh import TetMesh
@@ -122,9 +122,10 @@ def draw(args) -> int:
     """Draw pictures."""
     if not Path(args.file).exists():
         raise UsageError(f"no such file: {args.file}")
-    kinds = [kind for kind in ("webp", "gif") if getattr(args, kind)]
-    if kinds and importlib.util.find_spec("PIL") is None:
-        raise UsageError("animations need Pillow: pip install 'warp_contact[render]'")
+    kinds = [kind for kind in NEEDS if getattr(args, kind)]
+    for kind in kinds:
+        if importlib.util.find_spec(NEEDS[kind][0]) is None:
+            raise UsageError(NEEDS[kind][1])
     with usd_errors(args.file):
         stage = readable_stage(Path(args.file), "all")
         every = frame_numbers(stage)
@@ -136,7 +137,8 @@ def draw(args) -> int:
         rate = frame_rate(stage) * len(frames) / max(1, frames[-1] - frames[0] + 1)
         root = Path(stage.GetRootLayer().realPath)
         out = args.out or root.parent / "pictures"
-        looks = {"samples": args.samples, "wire": args.wire, "device": args.device}
+        names = ("samples", "wire", "cut", "device")
+        looks = {name: getattr(args, name) for name in names}
         if not args.quiet:
             looks["report"] = lambda path: print(path, flush=True)
         pictures = render(stage, out, frames, args.size, args.eye, args.target, **looks)

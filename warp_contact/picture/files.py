@@ -1,11 +1,17 @@
-"""Picture files: PNG by the standard library alone, animated WebP and GIF with Pillow."""
+"""Picture files: PNG by the standard library, WebP and GIF with Pillow, MP4 with ffmpeg."""
 
+import contextlib
 import struct
+import subprocess
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+
+PILLOW = "PIL", "animations need Pillow: pip install 'warp_contact[render]'"
+FFMPEG = "imageio_ffmpeg", "an MP4 needs imageio-ffmpeg: pip install 'warp_contact[video]'"
+NEEDS = {"webp": PILLOW, "gif": PILLOW, "mp4": FFMPEG}  # by suffix: module, what to say without it
 
 
 def write_png(path, picture: np.ndarray) -> None:
@@ -50,22 +56,47 @@ def png(picture: np.ndarray) -> bytes:
 
 
 def animate(pictures: Iterable, path, fps: float = 30.0) -> None:
-    """Join picture files into an animated WebP or GIF, by the suffix of ``path``; needs Pillow.
+    """Join picture files into an animated WebP, a GIF or an MP4, by the suffix of ``path``.
 
     A GIF plays at 50 pictures a second at most: viewers slow down a faster one.
+
+    Raises:
+        ImportError: there is no Pillow, or for an MP4 no imageio-ffmpeg
+        OSError: ffmpeg failed
     """
+    kind = Path(path).suffix[1:]
+    if kind == "mp4":
+        return _film(pictures, path, fps)
     try:
         from PIL import Image
     except ImportError as error:
-        raise ImportError("animations need Pillow: pip install 'warp_contact[render]'") from error
+        raise ImportError(NEEDS[kind][1]) from error
     images = [Image.open(picture).convert("RGB") for picture in pictures]
-    webp = Path(path).suffix == ".webp"
-    options: dict = {"quality": 80, "method": 4} if webp else {}
+    options: dict = {"quality": 80, "method": 4} if kind == "webp" else {}
     images[0].save(
         path,
         save_all=True,
         append_images=images[1:],
-        duration=max(round(1000.0 / fps), 1 if webp else 20),
+        duration=max(round(1000.0 / fps), 1 if kind == "webp" else 20),
         loop=0,
         **options,
     )
+
+
+def _film(pictures: Iterable, path, fps: float) -> None:
+    """Join PNG files into an MP4 that any player takes: H.264, even width and height."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError as error:
+        raise ImportError(NEEDS["mp4"][1]) from error
+    command = f"-y -loglevel error -f image2pipe -c:v png -framerate {fps:.6g} -i -"
+    command += " -vf pad=ceil(iw/2)*2:ceil(ih/2)*2 -c:v libx264 -pix_fmt yuv420p -crf 18"
+    command += " -movflags +faststart"
+    program = [get_ffmpeg_exe(), *command.split(), str(path)]
+    with subprocess.Popen(program, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
+        with contextlib.suppress(BrokenPipeError):  # it says itself why it ended
+            for picture in pictures:
+                ffmpeg.stdin.write(Path(picture).read_bytes())
+        _, said = ffmpeg.communicate()
+    if ffmpeg.returncode:
+        raise OSError(f"cannot write {path}: ffmpeg says {said.decode(errors='replace').strip()}")

@@ -33,7 +33,9 @@ class Camera:
 class Renderer:
     """Draws moving triangles of constant connectivity."""
 
-    def __init__(self, tris, rest, planes=(), size=(960, 540), samples=2, rays=4, wire=0.0):
+    def __init__(
+        self, tris, rest, planes=(), size=(960, 540), samples=2, rays=4, wire=0.0, cut=None
+    ):
         """Prepare for a mesh.
 
         Args:
@@ -44,6 +46,7 @@ class Renderer:
             samples: rays along each side of a pixel
             rays: rays of each sample to the sun, and to the sky
             wire: how much the edges of the triangles are darkened, 0 ... 1
+            cut: normal and offset [m] of a plane beyond which no body is drawn
         """
         tris = np.ascontiguousarray(tris, dtype=np.int32).reshape(-1, 3)
         order = np.argsort(tris.ravel(), kind="stable")
@@ -54,10 +57,14 @@ class Renderer:
         self.start = wp.array(np.append(0, np.cumsum(count)), dtype=int)
         self.around = wp.array(order // 3, dtype=int)
         self.rest = self._areas(wp.array(np.asarray(rest, dtype=np.float32), dtype=wp.vec3))
+        n, d = ((0.0, 0.0, 0.0), 1.0) if cut is None else cut
+        self.cut = wp.vec4(*(np.append(n, d) / (np.linalg.norm(n) or 1.0)))
         rows = [(*np.asarray(n) / np.linalg.norm(n), h) for n, h in planes]
         self.plane = wp.array(np.array(rows, np.float32).reshape(-1, 4), dtype=wp.vec4)
 
-    def picture(self, points, colors, camera: Camera, center=None, reach=None) -> np.ndarray:
+    def picture(
+        self, points, colors, camera: Camera, center=None, reach=None, inside=None
+    ) -> np.ndarray:
         """The picture, shape (height, width, 3), uint8.
 
         Args:
@@ -66,6 +73,7 @@ class Renderer:
             camera: from where
             center: where the ground starts to fade [m]; None takes the middle of the points
             reach: size of the scene [m]; None takes that of the points
+            inside: linear colours where a body is cut, of its vertices; None takes ``colors``
         """
         points = np.asarray(points, dtype=np.float32)
         low, high = points.min(0), points.max(0)
@@ -75,12 +83,14 @@ class Renderer:
         mesh = wp.Mesh(points=x, indices=self.index)
         normal = self.corner_normals(x)
         color = wp.array(np.asarray(colors, dtype=np.float32), dtype=wp.vec3)
+        core = color if inside is None else wp.array(np.float32(inside), dtype=wp.vec3)
         width, height = self.size
         picture = wp.empty(width * height, dtype=wp.vec3)
         wp.launch(
             kernels.cast,
             dim=width * height,
-            inputs=[self._view(camera), light(mesh, center, reach), self.plane, color, normal],
+            inputs=[self._view(camera), light(mesh, center, reach, self.cut), self.plane]
+            + [color, normal, core],
             outputs=[picture],
         )
         return np.rint(255.0 * picture.numpy()).astype(np.uint8).reshape(height, width, 3)
@@ -112,10 +122,10 @@ class Renderer:
         return view
 
 
-def light(mesh: wp.Mesh, center, reach: float) -> kernels.Light:
+def light(mesh: wp.Mesh, center, reach: float, cut: wp.vec4) -> kernels.Light:
     """A low warm sun and a bright sky over a neutral ground."""
     result = kernels.Light()
-    result.mesh = mesh.id
+    result.mesh, result.cut = mesh.id, cut
     result.sun = wp.normalize(wp.vec3(SUN))
     result.sun_power, result.sun_size = 0.85, 0.12
     result.sky, result.bounce = wp.vec3(0.50, 0.53, 0.58), wp.vec3(0.24, 0.23, 0.22)

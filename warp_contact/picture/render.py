@@ -40,7 +40,7 @@ def render(
     samples: int = 2,
     rays: int = 4,
     wire: float = 0.0,
-    floor: bool = True,
+    cut=None,
     device=None,
     report=None,
 ) -> list[Path]:
@@ -56,18 +56,18 @@ def render(
         samples: rays along each side of a pixel
         rays: rays of each sample to the sun, and to the sky
         wire: how much the edges of the triangles are darkened, 0 ... 1
-        floor: draw a ground under the lowest point where the scene has no half-space
+        cut: n and d: of bodies what lies at n . x > d [m] is not drawn, shape (4,)
         device: Warp device
         report: called with each path as it is written
     """
-    size, *quality = checked_quality(size, samples, rays, wire)
+    size, *quality = checked_quality(size, samples, rays, wire, cut)
     if not isinstance(stage, Usd.Stage):
         stage = open_stage(stage)
     every, drawing = frame_numbers(stage), Drawing.of(stage)
     frames = chosen_frames(frames, every)
     low, high = drawing.bounds(every)
     camera = chosen_camera(read_view(stage), eye, target, low, high, size[0] / size[1])
-    planes = read_planes(stage) or ([(np.array([0.0, 0.0, 1.0]), float(low[2]))] if floor else [])
+    planes = read_planes(stage) or [(np.array([0.0, 0.0, 1.0]), float(low[2]))]
     center, reach = 0.5 * (low + high), float(np.linalg.norm(high - low))
     with wp.ScopedDevice(device):
         rest = drawing.points(every[0])
@@ -75,14 +75,19 @@ def render(
         return draw(drawing, frames, renderer, (camera, center, reach), Path(out_dir), report)
 
 
-def checked_quality(size, samples, rays, wire) -> tuple:
-    """What a picture costs; raises ValueError for what cannot work."""
+def checked_quality(size, samples, rays, wire, cut) -> tuple:
+    """What a picture costs, and what it shows; raises ValueError for what cannot work."""
     size = tuple(checks.count(pixels, "size", most=WIDEST) for pixels in size)
     samples, rays = (
         checks.count(value, name, most=FINEST)
         for value, name in ((samples, "samples"), (rays, "rays"))
     )
-    return size, samples, rays, checks.number(wire, "wire", 0.0, 1.0)
+    if cut is not None:
+        *n, d = checks.numbers(cut, (4,), "cut")
+        if not any(n):
+            raise checks.refuse("cut", list(cut), "a normal that is not zero, and an offset")
+        cut = n, d
+    return size, samples, rays, checks.number(wire, "wire", 0.0, 1.0), cut
 
 
 def draw(drawing, frames: list[int], renderer: Renderer, view: tuple, out_dir: Path, report):
@@ -90,7 +95,9 @@ def draw(drawing, frames: list[int], renderer: Renderer, view: tuple, out_dir: P
     paths = [out_dir / f"{frame:06d}.png" for frame in frames]
     out_dir.mkdir(parents=True, exist_ok=True)
     for frame, path in zip(frames, paths, strict=True):
-        write_png(path, renderer.picture(drawing.points(frame), drawing.colors(frame), *view))
+        colors = drawing.colors(frame)
+        shown = drawing.points(frame), colors, *view, drawing.middle(colors)
+        write_png(path, renderer.picture(*shown))
         if report is not None:
             report(path)
     return paths
@@ -158,6 +165,12 @@ class Drawing:
             color = np.nan_to_num(np.clip(color, 0.0, 1.0))
             result.append(color if len(color) == n else np.tile(color[:1], (n, 1)))
         return np.concatenate(result)
+
+    def middle(self, colors: np.ndarray) -> np.ndarray:
+        """The colour of most points of a mesh, for all of its points, shape (n_vert, 3)."""
+        ends = np.cumsum(self.sizes)[:-1]
+        parts = [np.median(part, axis=0) for part in np.split(colors, ends)]
+        return np.repeat(parts, self.sizes, axis=0)
 
     def bounds(self, frames: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner [m] over the frames."""

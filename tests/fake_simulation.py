@@ -1,6 +1,7 @@
 """Moving cubes without a solver for the tests of USD files."""
 
 from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import warp as wp
@@ -13,6 +14,8 @@ from warp_contact.usd.writer import UsdWriter
 
 class FakeSimulation:
     """Waving cubes: the interface the writer needs, with positions known at every frame."""
+
+    BODY: ClassVar[dict] = {"world": 0, "friction": None, "start": None}
 
     def __init__(self, labels=("left", "right"), n=4, fps=60):
         """Unit cubes of n^3 cells in a row along x."""
@@ -44,7 +47,15 @@ class FakeSimulation:
             plane_h=wp.array([0.0], dtype=float, device="cpu"),
         )
         self.scene = SimpleNamespace(
-            bodies=[SimpleNamespace(x=part) for part in np.split(self.rest, k)]
+            bodies=[
+                SimpleNamespace(
+                    x=part, v=0.0 * part, fixed=held == 0.0, material=material, **self.BODY
+                )
+                for part, held in zip(np.split(self.rest, k), np.split(free, k), strict=True)
+            ],
+            gravity=self.model.gravity,
+            friction=0.5,
+            plane_friction=[None],
         )
         self.fps, self.frame = fps, 0
 

@@ -99,8 +99,10 @@ class Simulation(BetweenFrames, ContactData, Joined):
         self._bodies = Bodies(self.model, self.scene)
         self._integrator = choose(integrator, *of, self.response)
         load_kernels(self.model, self.device, self._integrator.implicit)
-        x = self.state.x.numpy().astype(np.float64)
-        shapes = find_shapes(self.model, x) if self._integrator.implicit else None
+        x = np.concatenate([body.x for body in self.scene.bodies]).astype(np.float32)
+        shapes = (
+            find_shapes(self.model, x.astype(np.float64)) if self._integrator.implicit else None
+        )
         self._stepper = Stepper(
             *of, self.response, self.fps, substeps, max_substeps, sleeping, shapes
         )

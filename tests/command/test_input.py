@@ -31,7 +31,7 @@ def Xform "World"
     {{
         custom uniform int userProperties:body = 0
         {label}
-        def Mesh "surface"
+        def Mesh "b"
         {{
             point3f[] points = {points}
             float3[] extent = [(0,0,0), (1,1,1)]
@@ -84,7 +84,7 @@ def test_a_stage_as_it_should_be_is_read_by_every_command(stage, capsys, tmp_pat
         ({"label": ""}, "a.usda: /World/b lacks the number, label or surface of a body"),
         (
             {"counts": "[3,3,3,2000000000]"},
-            "a.usda: /World/b/surface do not fit its 4 points",
+            "a.usda: /World/b/b do not fit its 4 points",
         ),
         ({"indices": "[1,2,3,0,3,2,0,1,3,0,2,-9]"}, "do not fit its 4 points"),
         ({"points": "[(nan,0,0), (1,0,0), (0,1,0), (0,0,1)]"}, "that are not finite"),

@@ -22,7 +22,7 @@ def copied(stage) -> Usd.Stage:
 
 
 def set_surface(stage, name, value, frame):
-    stage.GetPrimAtPath("/World/left/surface").GetAttribute(name).Set(value, frame)
+    stage.GetPrimAtPath("/World/left/left").GetAttribute(name).Set(value, frame)
 
 
 def stale_extent(stage):
@@ -34,7 +34,7 @@ def short_primvar(stage):
 
 
 def no_number(stage):
-    mesh = UsdGeom.Mesh.Get(stage, "/World/left/surface")
+    mesh = UsdGeom.Mesh.Get(stage, "/World/left/left")
     points = np.array(mesh.GetPointsAttr().Get(1))
     points[3, 1] = np.nan
     mesh.GetPointsAttr().Set(points, 1)
@@ -46,7 +46,7 @@ def wrong_index(stage):
 
 
 def moving_topology(stage):
-    mesh = UsdGeom.Mesh.Get(stage, "/World/left/surface")
+    mesh = UsdGeom.Mesh.Get(stage, "/World/left/left")
     mesh.GetFaceVertexCountsAttr().Set(mesh.GetFaceVertexCountsAttr().Get(), 1)
 
 
@@ -58,7 +58,7 @@ def inverted_tet(stage):
 
 
 def missing_sample(stage):
-    stage.GetPrimAtPath("/World/left/surface").GetAttribute("points").ClearAtTime(3)
+    stage.GetPrimAtPath("/World/left/left").GetAttribute("points").ClearAtTime(3)
 
 
 def wrong_axis(stage):
@@ -79,7 +79,7 @@ def no_default_prim(stage):
         (stale_extent, "extent"),
         (short_primvar, "contact:pressure"),
         (no_number, "not finite"),
-        (wrong_index, "left/surface"),
+        (wrong_index, "left/left"),
         (moving_topology, "time-sampled"),
         (inverted_tet, "inverted"),
         (missing_sample, "samples"),

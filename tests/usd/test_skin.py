@@ -58,7 +58,7 @@ def test_render_surfaces_are_what_is_seen(tmp_path, picture):
         if prim.IsA(UsdGeom.Mesh) and UsdGeom.Imageable(prim).ComputePurpose() == "default"
     }
     assert seen == {
-        f"/World/{name}" for name in ("soft/render", "hard/render", "bare/surface", "ground")
+        f"/World/{name}" for name in ("soft/render", "hard/render", "bare/bare", "ground")
     }
     x, normals = sim.rendered("soft")
     soft = mesh_at(stage, "/World/soft/render")

@@ -69,7 +69,7 @@ def test_layout_metadata_and_schemas(tmp_path):
     assert {tuple(sorted(f)) for f in faces} == {tuple(sorted(f)) for f in own}
     material, _ = UsdShade.MaterialBindingAPI(sim).ComputeBoundMaterial("physics")
     assert material.GetPrim().GetAttribute("physics:youngsModulus").Get() == pytest.approx(1e5)
-    surface = stage.GetPrimAtPath("/World/left/surface")
+    surface = stage.GetPrimAtPath("/World/left/left")
     look, _ = UsdShade.MaterialBindingAPI(surface).ComputeBoundMaterial()
     assert look.GetPath() == "/World/Looks/contact"
     ((n, h),) = reader.read_planes(stage)
@@ -103,7 +103,7 @@ def test_contact_primvars_are_rounded_by_a_thousandth(tmp_path):
     stage = written(tmp_path / "run", 5, sim=sim)
     ids = surface_ids(sim, 1)
     expected = sim.contact_fields()["pressure"][ids]
-    prim = stage.GetPrimAtPath("/World/right/surface")
+    prim = stage.GetPrimAtPath("/World/right/right")
     pressure = np.asarray(prim.GetAttribute("primvars:contact:pressure").Get(5))
     assert len(np.unique(writer.rounded(np.linspace(0.0, 7.0, 100_000)))) == writer.LEVELS
     # Half a step of LEVELS - 1 steps up to the largest value.

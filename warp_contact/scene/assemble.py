@@ -49,7 +49,8 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         plane_h=_floats([h for _, h in scene.planes]),
         ties=lay_out(scene.attachments, scene.bodies),
     )
-    return model, State(x=wp.array(x, dtype=wp.vec3), v=wp.array(v, dtype=wp.vec3))
+    starts = np.concatenate([body.starts for body in bodies])
+    return model, State(x=wp.array(starts, dtype=wp.vec3), v=wp.array(v, dtype=wp.vec3))
 
 
 def _friction(scene: Scene) -> list[float]:

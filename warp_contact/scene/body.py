@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.pose import pose_of
 from warp_contact.scene.surface import Surface
 
 
@@ -24,6 +25,8 @@ class Body:
         world: bodies of different worlds never touch
         friction: its Coulomb coefficient, None for that of the scene
         render: surface to draw in place of that of its tets, in the frame of the mesh, or None
+        start: positions [m] in which it starts, shape (n, 3), if it is deformed then; else None,
+            and it starts at ``x``
     """
 
     index: int
@@ -36,3 +39,14 @@ class Body:
     world: int
     friction: float | None = None
     render: Surface | None = None
+    start: np.ndarray | None = field(default=None, repr=False)
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Positions in which it starts [m], shape (n, 3)."""
+        return self.x if self.start is None else self.start
+
+    @property
+    def pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """Position [m] and quaternion (x, y, z, w) that take its mesh to ``x``."""
+        return pose_of(self.x, self.mesh.vertices, np.ones(len(self.x)))

@@ -55,10 +55,10 @@ def check(bodies: list) -> None:
     """
     edges = [_mean_edge(body) for body in bodies]
     for body, edge in zip(bodies, edges, strict=True):
-        check_distance(body.x, edge, body.label)
+        check_distance(body.starts, edge, body.label)
         if not np.isfinite(body.v).all():
             raise ValueError(f"body '{body.label}' has a velocity that is not finite")
-        strain = float(np.abs(body.x).max()) * ROUNDING / _heights(body)
+        strain = float(np.abs(body.starts).max()) * ROUNDING / _heights(body)
         if strain.max() > STRAINED:
             raise ValueError(
                 f"body '{body.label}', tet {int(strain.argmax())} is too flat: rounding of its "
@@ -107,7 +107,8 @@ def _shape(body) -> np.ndarray:
     The radii are the root mean squares of the distances of its points from six planes through its
     middle, those of the axes and of the diagonals.
     """
-    corner = body.x[body.mesh.tets]
+    x = body.starts
+    corner = x[body.mesh.tets]
     weight = body.mesh.volumes / body.mesh.volume
     middle = weight @ corner.mean(axis=1)
     r = corner - middle
@@ -116,7 +117,7 @@ def _shape(body) -> np.ndarray:
     square += np.einsum("m,mi,mj->ij", weight, total, total)
     n = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
     radius = np.sqrt(np.einsum("ai,ij,aj->a", n, square / 20.0, n))
-    return np.concatenate([body.x.min(axis=0), body.x.max(axis=0), middle, radius])
+    return np.concatenate([x.min(axis=0), x.max(axis=0), middle, radius])
 
 
 def _heights(body) -> np.ndarray:

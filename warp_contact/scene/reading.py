@@ -1,9 +1,10 @@
 """Reads mesh files with the libraries of others, as a program of its own: ``files.py`` starts it.
 
-    python reading.py meshio|usd|stage PATH ARGUMENT BYTES
+    python reading.py meshio|usd|scene|stage PATH ARGUMENT BYTES
 
 Damaged files make such libraries hang, crash or take all memory. Here that can be ended, and the
-process that asked lives on. Nothing of ``warp_contact`` is imported, which would take a second.
+process that asked lives on. Of ``warp_contact`` only what needs no Warp is imported: that takes a
+second.
 
 What goes to stdout is ``+`` and an ``.npz`` archive, or ``-`` and what is wrong with the file.
 """
@@ -13,6 +14,7 @@ import math
 import os
 import re
 import sys
+import types
 import warnings
 from contextlib import redirect_stderr, redirect_stdout, suppress
 
@@ -194,6 +196,19 @@ def upright(stage, x):
     return x
 
 
+def read_scene(path: str, at: str) -> bytes:
+    """What ``reading_scene.py`` finds in a stage."""
+    package = types.ModuleType("warp_contact")  # without what its __init__ imports
+    package.__path__ = [os.path.dirname(os.path.dirname(os.path.abspath(__file__)))]
+    sys.modules["warp_contact"] = package
+    from warp_contact.scene import reading_scene
+
+    try:
+        return packed(**reading_scene.read(opened(path), at))
+    except reading_scene.Unfit as error:
+        raise Unfit(str(error)) from error
+
+
 def read_stage(path: str, frames: str) -> bytes:
     """Read every attribute at the earliest time, or at all: what can hang or crash does so here."""
     from pxr import Usd
@@ -224,7 +239,7 @@ def in_short(text: str) -> str:
     return " ".join(text.split())[:200]
 
 
-READERS = {"meshio": read_meshio, "usd": read_usd, "stage": read_stage}
+READERS = {"meshio": read_meshio, "usd": read_usd, "scene": read_scene, "stage": read_stage}
 
 if __name__ == "__main__":
     sys.exit(main(*sys.argv[1:]))

@@ -6,7 +6,7 @@ from numbers import Integral
 import numpy as np
 
 from warp_contact import checks
-from warp_contact.scene import attachments, placement
+from warp_contact.scene import attachments, from_usd, placement
 from warp_contact.scene.attachments import Attachment
 from warp_contact.scene.body import Body
 from warp_contact.scene.materials import Rigid
@@ -28,6 +28,7 @@ class Scene:
         planes: (outward unit normal, offset along it [m]) of each half-space
         plane_friction: the coefficient of each half-space, None for that of the scene
         attachments: what holds bodies at each other, in the order in which they were added
+        not_read: what a USD stage holds and ``from_usd`` did not read or had to assume, in words
     """
 
     def __init__(self, gravity=(0.0, 0.0, -9.81), friction: float = 0.3):
@@ -39,6 +40,32 @@ class Scene:
         self.planes: list[tuple[np.ndarray, float]] = []
         self.plane_friction: list[float | None] = []
         self.attachments: list[Attachment] = []
+        self.not_read: list[str] = []
+
+    @classmethod
+    def from_usd(cls, path, at: str | float = "start", material=None) -> "Scene":
+        """Read the tets of a USD stage and their physics: what a ``UsdWriter`` wrote, or others.
+
+        Each TetMesh is a body, or those together that are below one ``PhysicsRigidBodyAPI``. Taken
+        are rest shapes, transforms, materials, masses, velocities, what is kinematic or held,
+        planes that collide and gravity, in units and axes of the stage. ``not_read`` lists the
+        rest; where that is physics, a warning says so.
+
+        Args:
+            path: a file, or the folder of a ``UsdWriter``
+            at: ``start``; ``last`` or the number of a frame takes positions and velocities there,
+                for bodies that deform as far as ``UsdWriter(animate_tets=True, velocities=True)``
+                has written them
+            material: of bodies that deform and have no Young's modulus in the stage
+
+        Raises:
+            OSError: there is no such file
+            ValueError: it is damaged or holds no TetMesh, a body cannot be simulated, or has no
+                material; the inner vertices of one were not written
+        """
+        scene = cls()
+        from_usd.fill(scene, path, at, material)
+        return scene
 
     def __setattr__(self, name: str, value) -> None:
         """Raises ValueError for a scene that a simulation has taken over, or a wrong value."""

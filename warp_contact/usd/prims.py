@@ -3,15 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, Vt
 
 from warp_contact import checks
+from warp_contact.usd.physics import Materials, add_body, add_frame, add_scene, note
 
 PALETTE = ("4c86b8", "6fa868", "dfb84e", "9579b6", "48a39b", "c9a57d", "c487a6", "71849f")  # sRGB
 FIXED, GROUND = "c4c4c0", "b9b9b5"  # sRGB
 WARM, HOT = "f08a24", "c3241c"  # sRGB, at half and at full pressure
 ROOM = 4.0  # half the width of a drawn half-space, in scene diagonals
 FOV = 28.0  # vertical angle of view [degrees]
+TAKEN = ("Looks", "view", "physics", "render", "sim")  # names of prims that are no body
 FLAGS = ("velocities", "tets", "flatten", "animate_tets", "resume")  # of a UsdWriter
 
 
@@ -39,6 +41,11 @@ class Part:
     fixed: bool
     color: np.ndarray
     rest: np.ndarray | None
+
+    @property
+    def surface(self) -> str:
+        """Its surface: Blender shows a Mesh by its own name, not by that of the Xform above."""
+        return f"{self.path}/{Sdf.Path(self.path).name}"
 
     @property
     def is_rigid(self) -> bool:
@@ -89,7 +96,7 @@ def parts(model) -> list[Part]:
     """The bodies of a model with their prims, surface vertices and colours."""
     tris, inv_mass = model.tris.numpy().reshape(-1, 3), model.inv_mass.numpy()
     tri, vert = model.body_tri.numpy(), model.body_vert.numpy()
-    taken, result = {"Looks", "view"}, []
+    taken, result = {*TAKEN}, []
     for b, label in enumerate(model.labels):
         ids, faces = np.unique(tris[tri[b] : tri[b + 1]], return_inverse=True)
         fixed = not bool(inv_mass[vert[b] : vert[b + 1]].any())
@@ -121,7 +128,7 @@ def prim_name(label: str, taken: set[str]) -> str:
 
 def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Layer:
     """The layer of everything that does not change; the same at any time of a run."""
-    model = sim.model
+    model, friction = sim.model, frictions(sim.scene)
     x = np.concatenate([body.x for body in sim.scene.bodies]).astype(np.float32)
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
@@ -131,9 +138,9 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
     stage.SetDefaultPrim(world.GetPrim())
     UsdGeom.Scope.Define(stage, "/World/Looks")
     look = contact_look(stage)
-    physics: dict = {}
-    local = x.copy()
-    for part, label in zip(parts, model.labels, strict=True):
+    add_scene(stage, sim.scene)
+    physics, local = Materials(stage), x.copy()
+    for part, label, body in zip(parts, model.labels, sim.scene.bodies, strict=True):
         xform = UsdGeom.Xform.Define(stage, part.path)
         Usd.ModelAPI(xform).SetKind(Kind.Tokens.component)
         note(xform, "label", Sdf.ValueTypeNames.String, label)
@@ -141,38 +148,26 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
         note(xform, "fixed", Sdf.ValueTypeNames.Bool, part.fixed)
         if part.is_rigid:
             local[slice(*part.verts)] = part.rest
-            add_frame(xform, part.fixed, model.solids[part.index])
+            add_frame(xform, body, model.solids[part.index])
         add_surface(stage, part, local, look)
         if tets:
-            add_tets(stage, part, model, local, physics)
-    taken = {Sdf.Path(part.path).name for part in parts} | {"Looks", "view"}
-    for n, h in zip(model.plane_n.numpy(), model.plane_h.numpy(), strict=True):
-        add_plane(stage, f"/World/{prim_name('ground', taken)}", n, float(h), x, look)
+            mesh = add_tets(stage, part, model, local)
+            add_body(xform, mesh, body, part.is_rigid)
+            physics.bind(mesh, friction[part.index], body.material)
+    taken = {Sdf.Path(part.path).name for part in parts} | {*TAKEN}
+    planes = zip(model.plane_n.numpy(), model.plane_h.numpy(), friction[len(parts) :], strict=True)
+    for n, h, mu in planes:
+        path = f"/World/{prim_name('ground', taken)}"
+        physics.bind(add_plane(stage, path, n, float(h), x, look), mu)
     if view is not None:
         add_camera(stage, *view)
     return layer
 
 
-def add_frame(xform: UsdGeom.Xform, fixed: bool, solid) -> None:
-    """Let the prim of a rigid body be moved; ``solid`` is what it weighs, None if it is fixed."""
-    xform.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
-    xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
-    UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim()).CreateKinematicEnabledAttr(fixed)
-    if solid:
-        weighs = UsdPhysics.MassAPI.Apply(xform.GetPrim())
-        moments, axes = np.linalg.eigh(solid.inertia)
-        axes[:, 2] *= np.linalg.det(axes)
-        turn = Gf.Matrix3d(axes.T.tolist()).ExtractRotation().GetQuat()
-        weighs.CreateMassAttr(solid.mass)
-        weighs.CreateCenterOfMassAttr(Gf.Vec3f(*solid.centre.tolist()))
-        weighs.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
-        weighs.CreatePrincipalAxesAttr(Gf.Quatf(turn))
-
-
-def note(prim, name: str, kind, value) -> None:
-    """Set a constant under ``userProperties``."""
-    path = f"userProperties:{name}"
-    prim.GetPrim().CreateAttribute(path, kind, True, Sdf.VariabilityUniform).Set(value)
+def frictions(scene) -> list[float]:
+    """Coulomb coefficient of each body, then of each half-space."""
+    own = [*(body.friction for body in scene.bodies), *scene.plane_friction]
+    return [scene.friction if mu is None else mu for mu in own]
 
 
 def contact_look(stage) -> UsdShade.Material:
@@ -206,7 +201,7 @@ def add_mesh(stage, path: str, points: np.ndarray, faces: np.ndarray, look) -> U
 
 def add_surface(stage, part: Part, x: np.ndarray, look) -> None:
     """The surface of a body, with its primvars declared."""
-    mesh = add_mesh(stage, f"{part.path}/surface", x[part.ids], part.faces, look)
+    mesh = add_mesh(stage, part.surface, x[part.ids], part.faces, look)
     api, types = UsdGeom.PrimvarsAPI(mesh), Sdf.ValueTypeNames
     n = len(part.ids)
     defaults = (
@@ -219,8 +214,8 @@ def add_surface(stage, part: Part, x: np.ndarray, look) -> None:
         api.CreatePrimvar(name, kind, UsdGeom.Tokens.vertex).Set(value)
 
 
-def add_tets(stage, part: Part, model, rest: np.ndarray, physics: dict) -> None:
-    """The TetMesh of a body; if it deforms under the names of the USD proposal, as bare tokens."""
+def add_tets(stage, part: Part, model, rest: np.ndarray) -> UsdGeom.TetMesh:
+    """The TetMesh of a body."""
     b, (first, end) = part.index, part.verts
     tet, tri = model.body_tet.numpy(), model.body_tri.numpy()
     tets = model.tets.numpy().reshape(-1, 4)[tet[b] : tet[b + 1]] - first
@@ -234,32 +229,10 @@ def add_tets(stage, part: Part, model, rest: np.ndarray, physics: dict) -> None:
     mesh.CreateSurfaceFaceVertexIndicesAttr(
         Vt.Vec3iArray.FromNumpy(np.ascontiguousarray(tris, np.int32))
     )
-    if not part.is_rigid:
-        stage.GetPrimAtPath(part.path).AddAppliedSchema("PhysicsDeformableBodyAPI")
-        mesh.GetPrim().AddAppliedSchema("PhysicsVolumeDeformableSimAPI")
-    mesh.GetPrim().AddAppliedSchema("PhysicsCollisionAPI")
-    material = model.materials[b]
-    names = ("youngs_modulus", "poisson_ratio", "density")
-    values = tuple(getattr(material, name, None) for name in names)
-    if None not in values:
-        if values not in physics:
-            physics[values] = physics_material(stage, f"physics_{len(physics)}", *values)
-        api = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
-        api.Bind(physics[values], materialPurpose="physics")
+    return mesh
 
 
-def physics_material(stage, name: str, youngs_modulus, poisson_ratio, density):
-    """A material of the USD deformable proposal."""
-    material = UsdShade.Material.Define(stage, f"/World/Looks/{name}")
-    UsdPhysics.MaterialAPI.Apply(material.GetPrim()).CreateDensityAttr(float(density))
-    material.GetPrim().AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
-    for key, value in ("youngsModulus", youngs_modulus), ("poissonsRatio", poisson_ratio):
-        attribute = material.GetPrim().CreateAttribute(f"physics:{key}", Sdf.ValueTypeNames.Float)
-        attribute.Set(float(value))
-    return material
-
-
-def add_plane(stage, path: str, n: np.ndarray, h: float, x: np.ndarray, look) -> None:
+def add_plane(stage, path: str, n: np.ndarray, h: float, x: np.ndarray, look) -> UsdGeom.Mesh:
     """A square on the boundary of the half-space n . x >= h, below the scene."""
     n = n / np.linalg.norm(n)
     u = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
@@ -277,6 +250,7 @@ def add_plane(stage, path: str, n: np.ndarray, h: float, x: np.ndarray, look) ->
         "displayColor", Sdf.ValueTypeNames.Color3fArray, UsdGeom.Tokens.constant
     )
     color.Set([tuple(map(float, linear(GROUND)))])
+    return mesh
 
 
 def add_camera(stage, eye, target) -> None:

@@ -144,7 +144,7 @@ def read_bodies(stage: Usd.Stage) -> list[Body]:
         index, label = read_note(prim, "body"), read_note(prim, "label")
         if index is None:
             continue
-        surface, sim = prim.GetChild("surface"), prim.GetChild("sim")
+        surface, sim = prim.GetChild(prim.GetName()), prim.GetChild("sim")
         if not isinstance(index, int) or not isinstance(label, str) or not surface:
             raise ValueError(f"{place(prim)} lacks the number, label or surface of a body")
         body = Body(

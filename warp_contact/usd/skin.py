@@ -68,7 +68,7 @@ def add_renders(topology: Sdf.Layer, chosen: list[Render]) -> None:
         surface, part = render.surface, render.part
         if render.texture not in looks:
             looks[render.texture] = textured(stage, render.texture)
-        hidden = UsdGeom.Imageable(stage.GetPrimAtPath(f"{part.path}/surface"))
+        hidden = UsdGeom.Imageable(stage.GetPrimAtPath(part.surface))
         hidden.CreatePurposeAttr(UsdGeom.Tokens.guide)
         points = surface.vertices.astype(np.float32)
         mesh = add_mesh(stage, render.path, points, surface.triangles, looks[render.texture])

@@ -24,7 +24,7 @@ from pxr import Sdf, Tf, UsdGeom, Vt
 from warp_contact.files import replacing
 from warp_contact.usd.folder import TOPOLOGY, RunFolder, frame_file, frame_files
 from warp_contact.usd.kept import check_frames, check_layers, first_frame
-from warp_contact.usd.motion import motion, motion_types, numbers
+from warp_contact.usd.motion import motion, motion_types, numbers, velocities, velocity_types
 from warp_contact.usd.prims import check_options, heated, parts, topology
 from warp_contact.usd.reader import open_stage
 from warp_contact.usd.skin import add_renders, copy_textures, render_types, render_values, renders
@@ -67,7 +67,7 @@ class UsdWriter:
             path: a directory, whose name the root layer takes, or the ``.usda`` root layer itself;
                 or a ``RunFolder``, which is closed with the writer
             sim: the simulation; its model, positions and contact fields are what is written
-            velocities: write the surface velocities [m/s] of bodies that deform too
+            velocities: write velocities too [m/s], those of surfaces, and of tets that are animated
             tets: write each body's TetMesh, purpose guide
             flatten: ``close()`` also writes everything into one ``<name>.usdc``
             animate_tets: time-sample the points of the TetMeshes, inner vertices included
@@ -179,10 +179,10 @@ class UsdWriter:
             self.scale = max(self.scale, float(fields["pressure"].max(initial=0.0)))
         color = heated(self.base, fields["pressure"] / (self.scale or 1.0))
         for part in self.parts:
-            mesh = f"{part.path}/surface."
+            mesh = f"{part.surface}."
             yield from motion(part, self.sim, x)
-            if v is not None and not part.is_rigid:
-                yield mesh + "velocities", Vt.Vec3fArray.FromNumpy(v[part.ids])
+            if v is not None:
+                yield from velocities(part, self.sim, x, v, self.animate_tets)
             yield mesh + "primvars:displayColor", Vt.Vec3fArray.FromNumpy(color[part.ids])
             for name in "pressure", "penetration":
                 value = Vt.FloatArray.FromNumpy(rounded(fields[name][part.ids]))
@@ -208,10 +208,10 @@ class UsdWriter:
             "contact:partner": types.IntArray,
         }
         for part in self.parts:
-            mesh, attributes = f"{part.path}/surface.", motion_types(part)
+            mesh, attributes = f"{part.surface}.", motion_types(part)
             attributes |= {f"{mesh}primvars:{name}": kind for name, kind in primvars.items()}
-            if self.velocities and not part.is_rigid:
-                attributes[mesh + "velocities"] = types.Vector3fArray
+            if self.velocities:
+                attributes |= velocity_types(part, self.sim.model, self.animate_tets)
             if self.animate_tets and not part.is_rigid:
                 attributes[f"{part.path}/sim.points"] = types.Point3fArray
                 attributes[f"{part.path}/sim.extent"] = types.Float3Array

@@ -1,0 +1,298 @@
+"""scene/from_usd.py and the files that read for it: what a stage says becomes a scene."""
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
+
+import warp_contact as wc
+from warp_contact.scene.scene import rotation_matrix
+from warp_contact.usd.check import problems
+
+MESH = wc.box((0.1, 0.12, 0.08), 2)
+TURN = (0.1, 0.2, 0.3, 0.9)
+
+
+def own_scene() -> wc.Scene:
+    """One of all that a file has to hold."""
+    scene = wc.Scene((0.5, 0.0, -9.81), friction=0.4)
+    scene.add_plane((0.0, 0.1, 1.0), -0.2, friction=0.9)
+    held, spin = MESH.vertices[:, 2] > 0.03, {"velocity": (1, 2, 3), "angular_velocity": (1, 5, 0)}
+    moved = MESH.transformed(np.eye(3), (0.3, 0.2, 0.1))
+    given = wc.Rigid(mass=2.0, centre=(0.01, 0, 0), inertia=0.02 * np.eye(3) + 0.001)
+    foam = wc.Corotated(1.3e5, 0.37, 1100.0, damping=1.5e-3)
+    springs = wc.SpringNetwork(1.0, 2.0, 3.0, 900.0, 1e-3)
+    scene.add_body(MESH, foam, (0, 0, 0.3), TURN, fixed=held, label="a ball", friction=0.7, world=2)
+    scene.add_body(MESH, wc.NeoHookean(1e5, 0.3, 1000.0), (0, 0, 0.1), **spin, label="b")
+    scene.add_body(MESH, springs, (0, 1, 0.1), label="net")
+    scene.add_body(moved, wc.Rigid(1300.0), (1, 0, 0.1), TURN, **spin, label="die")
+    scene.add_body(MESH, given, (2, 0, 0.1), TURN, label="given")
+    scene.add_body(MESH, wc.Rigid(1000.0), (3, 0, 0.1), TURN, fixed=True, label="tool")
+    return scene
+
+
+def written(place, scene: wc.Scene, frames: int = 4, **options) -> wc.Simulation:
+    """A run of a scene that is in USD files."""
+    sim = wc.Simulation(scene)
+    with wc.UsdWriter(place, sim, **options) as usd:
+        for _ in sim.frames(frames):
+            usd.write()
+    assert problems(place) == []
+    return sim
+
+
+WHOLE = {"velocities": True, "animate_tets": True}
+
+
+def test_what_is_written_is_read_back(tmp_path):
+    scene = own_scene()
+    written(tmp_path / "run", scene, 1)
+    found = wc.Scene.from_usd(tmp_path / "run")
+    assert found.not_read == []
+    assert (found.gravity, found.friction, found.plane_friction) == (scene.gravity, 0.4, [0.9])
+    # Float32, as all that follows.
+    for (n, h), (m, k) in zip(found.planes, scene.planes, strict=True):
+        np.testing.assert_allclose([*n, h], [*m, k], rtol=1e-6)
+    for body, wanted in zip(found.bodies, scene.bodies, strict=True):
+        assert (body.label, body.world) == (wanted.label, wanted.world)
+        assert body.friction == (0.4 if wanted.friction is None else wanted.friction)
+        np.testing.assert_array_equal(body.mesh.tets, wanted.mesh.tets)
+        np.testing.assert_array_equal(body.fixed, wanted.fixed)
+        np.testing.assert_allclose(body.x, wanted.x, atol=2e-7)
+        np.testing.assert_allclose(body.v, wanted.v, atol=2e-6)
+        if wanted.label == "given":
+            assert (body.material.mass, body.material.centre) == (2.0, (0.01, 0.0, 0.0))
+            np.testing.assert_allclose(body.material.inertia, wanted.material.inertia, atol=1e-8)
+        else:
+            assert body.material == wanted.material
+
+
+def test_a_run_goes_on_from_its_last_frame(tmp_path):
+    sim = written(tmp_path / "run", own_scene(), **WHOLE)
+    scene = wc.Scene.from_usd(tmp_path / "run", at="last")
+    assert scene.not_read == []
+    again = wc.Simulation(scene)
+    np.testing.assert_allclose(again.positions(), sim.positions(), atol=3e-7)  # float32
+    np.testing.assert_allclose(again.velocities(), sim.velocities(), atol=3e-6)
+    for _ in range(2):
+        sim.step_frame(), again.step_frame()
+    # 2 mm of deformation at 5 m/s; what rounding has changed grows in free flight.
+    np.testing.assert_allclose(again.positions(), sim.positions(), atol=2e-6)
+
+
+def test_a_deformed_start_is_written_and_read_back(tmp_path):
+    written(tmp_path / "run", own_scene(), **WHOLE)
+    late = wc.Scene.from_usd(tmp_path / "run", at=3)
+    assert late.bodies[1].start is not None and late.bodies[3].start is None
+    written(tmp_path / "late", late, 1)
+    found = wc.Scene.from_usd(tmp_path / "late")
+    for body, wanted in zip(found.bodies, late.bodies, strict=True):
+        np.testing.assert_allclose(body.starts, wanted.starts, atol=2e-7)
+        np.testing.assert_allclose(body.x, wanted.x, atol=2e-7)
+        np.testing.assert_allclose(body.v, wanted.v, atol=2e-6)
+
+
+def test_frames_without_inner_vertices_are_refused_and_motion_that_is_lost_is_listed(tmp_path):
+    scene = wc.Scene()
+    scene.add_body(MESH, wc.NeoHookean(1e5, 0.3, 1000.0), label="a")
+    tool = scene.add_body(MESH, wc.Rigid(1000.0), (1, 0, 0), fixed=True, label="tool")
+    sim = wc.Simulation(scene)
+    sim.set_velocity(tool, (0.0, 0.0, 1.0))
+    for place, options in ("bare", {}), ("slow", {"animate_tets": True}):
+        with wc.UsdWriter(tmp_path / place, sim, **options) as usd:
+            for _ in sim.frames(2):
+                usd.write()
+    with pytest.raises(
+        ValueError, match=r"/World/a has no frames of its inner .*animate_tets=True"
+    ):
+        wc.Scene.from_usd(tmp_path / "bare", at="last")
+    with pytest.warns(UserWarning, match="not_read"):
+        found = wc.Scene.from_usd(tmp_path / "slow", at="last")
+    lines = ["no velocities of /World/a at 4: it is at rest"]
+    assert found.not_read == [*lines, "the motion of /World/tool, which is driven: it stands still"]
+
+
+def foreign(path) -> Usd.Stage:
+    """A stage of others: centimetres, grams, y up, names of vendors, a die scaled by 2."""
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 0.001)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    UsdPhysics.Scene.Define(stage, "/scene").CreateGravityMagnitudeAttr(162.0)
+    die = UsdGeom.Xform.Define(stage, "/World/die")
+    die.AddTranslateOp().Set((0.0, 100.0, 0.0))
+    die.AddRotateZOp().Set(90.0)
+    die.AddScaleOp().Set((2.0, 2.0, 2.0))
+    moves = UsdPhysics.RigidBodyAPI.Apply(die.GetPrim())
+    moves.CreateVelocityAttr((0.0, -300.0, 0.0))
+    moves.CreateAngularVelocityAttr((0.0, 180.0, 0.0))
+    UsdPhysics.MassAPI.Apply(die.GetPrim()).CreateMassAttr(5000.0)
+    tets(stage, "/World/die/tets").AddAppliedSchema("PhysicsCollisionAPI")
+    soft = tets(stage, "/World/soft")
+    UsdGeom.Xformable(soft).AddTranslateOp().Set((50.0, 0.0, 0.0))
+    soft.AddAppliedSchema("OmniPhysicsDeformableBodyAPI")
+    jelly = {"youngsModulus": 1e4, "poissonsRatio": 0.3, "density": 1.2, "dynamicFriction": 0.6}
+    bind(stage, soft, jelly, "omniphysics")
+    stage.SetDefaultPrim(stage.GetPrimAtPath("/World"))
+    return stage
+
+
+def tets(stage, path: str) -> Usd.Prim:
+    """A TetMesh, ten centimetres large."""
+    mesh = UsdGeom.TetMesh.Define(stage, path)
+    mesh.CreatePointsAttr((100.0 * MESH.vertices).tolist())
+    mesh.CreateTetVertexIndicesAttr(MESH.tets.tolist())
+    return mesh.GetPrim()
+
+
+def bind(stage, prim, values: dict, space: str) -> None:
+    """Give a prim a material of its own."""
+    material = UsdShade.Material.Define(stage, f"{prim.GetPath()}_material")
+    for name, value in values.items():
+        kind = Sdf.ValueTypeNames.Float
+        material.GetPrim().CreateAttribute(f"{space}:{name}", kind).Set(value)
+    UsdShade.MaterialBindingAPI.Apply(prim).Bind(material, materialPurpose="physics")
+
+
+def read(stage, **options) -> wc.Scene:
+    """What is read of a stage, whatever it warns of."""
+    stage.Save()
+    with pytest.warns(UserWarning, match="not read or assumed"):
+        return wc.Scene.from_usd(stage.GetRootLayer().realPath, **options)
+
+
+def test_units_axes_and_names_of_others_are_understood(tmp_path):
+    scene = read(foreign(tmp_path / "a.usda"))
+    assert scene.gravity == (0.0, 0.0, -1.62)
+    die, soft = scene.bodies
+    assert (die.label, soft.label, soft.friction) == ("die", "soft", 0.6)
+    # Grams and centimetres: 1.2 g/cm^3, 1e4 g/(cm s^2) are 1200 kg/m^3, 1000 Pa; float32.
+    assert soft.material.youngs_modulus == pytest.approx(1e3, rel=1e-6)
+    assert soft.material.density == pytest.approx(1200.0, rel=1e-6)
+    assert die.material.mass or die.material.density * die.mesh.volume == pytest.approx(5.0)
+    upright = MESH.vertices @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    np.testing.assert_allclose(soft.x, upright + [0.5, 0.0, 0.0], atol=1e-7)
+    # Turned by 90 degrees about the stage's z, which is -y here, and twice as large.
+    turned = 2.0 * upright @ rotation_matrix((0.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5))).T
+    np.testing.assert_allclose(die.x, turned + [0.0, 0.0, 1.0], atol=1e-7)
+    spin = np.cross([0.0, 0.0, np.pi], die.x - [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(die.v, spin + [0.0, 0.0, -3.0], atol=1e-6)
+    assert scene.not_read == ["no friction of /World/die: that of the scene"]
+
+
+def test_what_is_not_understood_is_listed(tmp_path):
+    stage = foreign(tmp_path / "a.usda")
+    soft = stage.GetPrimAtPath("/World/soft")
+    soft.AddAppliedSchema("PhysxBaseDeformableBodyAPI")
+    name = "physxDeformableBody:solverPositionIterationCount"
+    soft.CreateAttribute(name, Sdf.ValueTypeNames.Int).Set(16)
+    UsdPhysics.RevoluteJoint.Define(stage, "/joint").CreateBody0Rel().SetTargets(["/World/die"])
+    UsdPhysics.CollisionAPI.Apply(UsdGeom.Cube.Define(stage, "/wall").GetPrim())
+    UsdPhysics.RigidBodyAPI.Apply(UsdGeom.Sphere.Define(stage, "/marble").GetPrim())
+    UsdPhysics.Scene.Define(stage, "/second")
+    UsdGeom.Cube.Define(stage, "/seen")
+    said = read(stage).not_read
+    for line in (
+        "PhysxBaseDeformableBodyAPI: /World/soft",
+        f"{name} = 16: /World/soft",
+        "PhysicsRevoluteJoint: /joint",
+        "a Cube that collides, without tets: /wall",
+        "a body without a TetMesh: /marble",
+        "PhysicsScene /second: /scene counts",
+        "Cube, only seen: /seen",
+    ):
+        assert line in said
+    assert len(said) == 9  # with the friction of the die, and the marble, which is seen too
+
+
+def test_attachments_to_what_stands_still_hold_vertices(tmp_path):
+    stage = foreign(tmp_path / "a.usda")
+    post = UsdGeom.Xform.Define(stage, "/post").GetPath()
+    kinds = Sdf.ValueTypeNames
+    for path, kind, space, ids, to in (
+        ("/pin", "PhysicsAttachment", "physics", "indices0", None),
+        ("/nail", "OmniPhysicsVtxXformAttachment", "omniphysics", "vtxIndicesSrc0", post),
+        ("/rope", "OmniPhysicsVtxXformAttachment", "omniphysics", "vtxIndicesSrc0", "/World/die"),
+    ):
+        prim = stage.DefinePrim(path, kind)
+        prim.CreateRelationship(f"{space}:src0").SetTargets(["/World/soft"])
+        if to:
+            prim.CreateRelationship(f"{space}:src1").SetTargets([to])
+        prim.CreateAttribute(f"{space}:{ids}", kinds.IntArray).Set([len(path), 1])
+    scene = read(stage)
+    assert np.flatnonzero(scene.bodies[1].fixed).tolist() == [1, 4, 5]
+    assert "OmniPhysicsVtxXformAttachment: /rope" in scene.not_read
+
+
+def test_kinematic_bodies_colliding_tets_and_planes_are_obstacles(tmp_path):
+    stage = foreign(tmp_path / "a.usda")
+    UsdPhysics.RigidBodyAPI(stage.GetPrimAtPath("/World/die")).CreateKinematicEnabledAttr(True)
+    wall = tets(stage, "/wall")
+    UsdGeom.Xformable(wall).AddTranslateOp().Set((-50.0, 0.0, 0.0))
+    wall.AddAppliedSchema("PhysicsCollisionAPI")
+    floor = UsdGeom.Plane.Define(stage, "/floor")
+    floor.CreateAxisAttr("Y")
+    floor.AddTranslateOp().Set((7.0, -30.0, 0.0))
+    UsdPhysics.CollisionAPI.Apply(floor.GetPrim())
+    scene = read(stage)
+    assert [(b.label, bool(b.fixed.all())) for b in scene.bodies] == [
+        ("die", True),
+        ("soft", False),
+        ("wall", True),
+    ]
+    assert scene.bodies[2].material.kernels is None
+    ((n, h),) = scene.planes
+    np.testing.assert_allclose([*n, h], [0.0, 0.0, 1.0, -0.3], atol=1e-7)
+
+
+def test_a_body_starts_deformed_where_its_rest_shape_is_another(tmp_path):
+    stage = foreign(tmp_path / "a.usda")
+    rest = stage.GetPrimAtPath("/World/soft").CreateAttribute(
+        "omniphysics:restShapePoints", Sdf.ValueTypeNames.Point3fArray
+    )
+    rest.Set((98.0 * MESH.vertices).tolist())
+    soft = read(stage).bodies[1]
+    # Float32 of 10 cm.
+    np.testing.assert_allclose(np.ptp(soft.x, axis=0), 0.98 * np.ptp(soft.start, axis=0), rtol=1e-6)
+    scene = wc.Scene((0.0, 0.0, 0.0))
+    scene.bodies.append(soft)
+    object.__setattr__(soft, "index", 0)
+    sim = wc.Simulation(scene)
+    np.testing.assert_allclose(sim.positions(), soft.start, atol=1e-7)
+    squeezed = sim.measure().elastic
+    # Strain 1/49 in all directions: 9 K e^2 / 2 of a volume, K = E / (3 - 6 nu); 6 % by its size.
+    wanted = 4.5 * 1e3 / (3.0 - 1.8) * (1.0 / 49.0) ** 2 * soft.mesh.volume
+    assert squeezed == pytest.approx(wanted, rel=0.06)
+
+
+def test_a_stage_that_makes_no_scene_is_refused_with_what_to_do(tmp_path):
+    stage = foreign(tmp_path / "a.usda")
+    tets(stage, "/bare")
+    stage.Save()
+    with pytest.raises(ValueError, match=r"/bare: has no youngsModulus: give material=wc\.Neo"):
+        wc.Scene.from_usd(tmp_path / "a.usda")
+    scene = read(stage, material=wc.NeoHookean(1e5, 0.3, 1000.0))
+    assert scene.bodies[-1].material.youngs_modulus == 1e5
+    text = (tmp_path / "a.usda").read_text()
+    (tmp_path / "b.usda").write_text(text[: len(text) // 2])
+    (tmp_path / "c.usda").write_text("#usda 1.0\n")
+    (tmp_path / "d.stl").write_text("solid")
+    for name, words in (
+        ("b.usda", "is not a readable USD file"),
+        ("c.usda", "holds no TetMesh: bodies are of tets"),
+        ("d.stl", "give a USD file"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            wc.Scene.from_usd(tmp_path / name)
+    with pytest.raises(FileNotFoundError, match=r"holds 3 \.usda files"):
+        wc.Scene.from_usd(tmp_path)
+    with pytest.raises(ValueError, match="at, which may be 'start' or 'last' too, 'end'"):
+        wc.Scene.from_usd(tmp_path / "a.usda", at="end")
+
+
+def test_quaternions_of_moments_are_those_of_usd(tmp_path):
+    stage, turn = foreign(tmp_path / "a.usda"), rotation_matrix(TURN)
+    mass = UsdPhysics.MassAPI(stage.GetPrimAtPath("/World/die"))
+    mass.CreateDiagonalInertiaAttr((3e5, 4e5, 5e5))  # [g cm^2]
+    mass.CreatePrincipalAxesAttr(Gf.Quatf(TURN[3], *TURN[:3]))
+    found = np.array(read(stage).bodies[0].material.inertia)
+    np.testing.assert_allclose(found, turn @ np.diag([0.03, 0.04, 0.05]) @ turn.T, atol=1e-8)

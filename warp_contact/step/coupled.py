@@ -65,6 +65,8 @@ def sweep_all(model: Model, v: wp.array, work: Work, look: int, extrapolation: f
 def close(model: Model, x: wp.array, work: Work, look: int) -> None:
     """Move ``x`` until no contact overlaps."""
     place(model, x, work.implicit)  # bodies turn about where they are now
+    if work.ties:
+        ties.begin_closure(x, work)
     w, c = work.implicit, work.contacts
     inputs = [c.n, c.record, work.surface.slack, x]
     outputs = [w.ahead, w.counted]

@@ -24,8 +24,16 @@ def begin(x: wp.array, work: Work) -> None:
     """Begin a step of ``work.dt`` at ``x``, or a part of one; where mobilities are those there."""
     t, d = work.ties, work.implicit.bodies
     wp.launch(matrix.begin_ties, t.n, inputs=[work.dt, x, d], outputs=[t.ties])
-    wp.launch(matrix.assemble, t.n, inputs=[x, d], outputs=[t.ties])
-    wp.launch(matrix.factorise, t.n_cluster, inputs=[], outputs=[t.ties])
+    _find_matrix(x, work)
+
+
+def begin_closure(x: wp.array, work: Work) -> None:
+    """Let matrix and row sums be those at ``x``, where the mobilities are now.
+
+    Where ties say twice what they say, those of another place could not take back what they add.
+    """
+    _find_matrix(x, work)
+    find_rows(work)
 
 
 def hold(model: Model, state: State, work: Work) -> None:
@@ -124,6 +132,12 @@ def wake_attached(mobile: wp.array, awake: wp.array, again: wp.array, work: Work
     t = work.ties
     inputs, outputs = [t.attachments, mobile], [awake, again]
     wp.launch(attachment.wake, t.n_attachment, inputs=inputs, outputs=outputs)
+
+
+def _find_matrix(x: wp.array, work: Work) -> None:
+    t = work.ties
+    wp.launch(matrix.assemble, t.n, inputs=[x, work.implicit.bodies], outputs=[t.ties])
+    wp.launch(matrix.factorise, t.n_cluster, inputs=[], outputs=[t.ties])
 
 
 def _pull(model: Model, y: wp.array, work: Work, keeps: bool) -> None:

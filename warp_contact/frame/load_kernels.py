@@ -35,8 +35,8 @@ ALWAYS = [scan, worlds, bounds, edges, hashing, skins, near, pairs, shape, lancz
 ALWAYS += [constraint, impulse, pair_impulses, warm_start, residual]
 ALWAYS += [contact_graph, crossing, depth, persistent, vertex_contact, vertices]
 TIES = attachment, lacking, matrix, solve, tied_rows
-IMPLICIT = (advance, bodies, masses, mobility, predict, settle, iterations)
-IMPLICIT += coupled, coupled_closure, rows
+IMPLICIT = [advance, bodies, masses, mobility, predict, settle, iterations]
+IMPLICIT += [coupled, coupled_closure, rows]
 
 
 def load_kernels(model: Model, device: wp.Device, implicit: bool) -> None:

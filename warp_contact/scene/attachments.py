@@ -1,5 +1,6 @@
 """Attachments: points of a body that are held at points of another body, or of the world."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -76,7 +77,7 @@ def make(index, label, a, b, kind, at, vertices, axis, stiffness, breaking_force
     return Attachment(index, label, kind, a, b, *given)
 
 
-def lay_out(attachments: tuple[Attachment, ...], bodies: tuple[Body, ...]) -> TieTable | None:
+def lay_out(attachments: Sequence[Attachment], bodies: Sequence[Body]) -> TieTable | None:
     """All attachments of a scene in one table; None without any.
 
     Raises:

@@ -201,7 +201,7 @@ class Scene:
     def _body(self, of) -> Body:
         """The body that is meant; raises ValueError where there is none."""
         if isinstance(of, Integral) and not isinstance(of, bool | np.bool_):
-            of = self.bodies[of] if 0 <= of < len(self.bodies) else of
+            of = self.bodies[int(of)] if 0 <= int(of) < len(self.bodies) else of
         for body in self.bodies:
             if of is body or (isinstance(of, str) and of == body.label):
                 return body

@@ -128,7 +128,7 @@ def _numbered(a: Attachment, start: np.ndarray) -> np.ndarray:
     return np.where(used, a.verts + both, a.verts[:, :1] + first)
 
 
-def _clusters(attachments: tuple[Attachment, ...], bodies: tuple[Body, ...]) -> np.ndarray:
+def _clusters(attachments: Sequence[Attachment], bodies: Sequence[Body]) -> np.ndarray:
     """Number of the cluster of each attachment; bodies that cannot move join nothing."""
     root = np.arange(len(bodies) + len(attachments))
 

@@ -34,6 +34,7 @@ MAY = {  # room: those that it may import, beside itself
     "runs": {"checks", "files", "usd"},
     "__init__": {"scene", "step", "measure", "usd", "simulation", "errors", "interrupts"}
     | {"runs"},
+    "newton": {"__init__", "scene", "checks"},
     "command": {"__init__", "errors", "files", "interrupts", "progress", "scene", "step"}
     | {"simulation", "usd", "picture", "checks"},
     "__main__": {"command"},
@@ -60,6 +61,7 @@ ONLY_IN = {  # packages that the solver does without
     "imageio_ffmpeg": {"picture/files"},
     "meshio": {"scene/files", "scene/reading", "scene/reading_faces"},
     "matplotlib": {"picture/plot"},
+    "newton": {"newton"},
 }
 # Folders whose files and functions are short.
 SIZED = ("warp_contact", "kernels", "scenes", "tests", "tools")

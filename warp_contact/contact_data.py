@@ -71,12 +71,12 @@ class ContactData:
         return contact_data.force_on(part[chosen], self._stepper.work, self._duration)
 
     def contact_fields(self) -> dict[str, np.ndarray]:
-        """Per vertex: ``pressure`` [Pa] over the last frame, ``penetration`` [m] and ``partner``.
+        """Per vertex: ``force`` [N] and ``pressure`` [Pa], means over the last frame, and more.
 
-        The partner is a body's index, n_body + p for plane p, -1 for none. Partner and penetration
-        are those of the last detection pass: at the predicted positions, after the closure where it
-        moved surfaces, at the start of the step for a penalty. Persistent contacts of edges have no
-        penetration. Shapes (n_vert,).
+        Beside these ``penetration`` [m] and ``partner``, a body's index, n_body + p for plane p, -1
+        for none. Both are those of the last detection pass: at the predicted positions, after the
+        closure where it moved surfaces, at the start of the step for a penalty. Persistent contacts
+        of edges have no penetration. Shapes (n_vert,), of the force (n_vert, 3).
         """
         return contact_fields(self.model, self.state.x, self._stepper.work, 1.0 / self.fps)
 

@@ -17,9 +17,11 @@ def contact_fields(model: Model, x: wp.array, work: Work, duration: float) -> di
         on = coef[:, k] != 0.0
         np.maximum.at(penetration, vert[on, k], depth[on])
         partner[vert[on, k]] = pair[on, 1 if k < 2 else 0]
-    impulse = np.linalg.norm(work.forces.received.numpy(), axis=1)
+    received = work.forces.received.numpy()
+    impulse = np.linalg.norm(received, axis=1)
     pressure = impulse / (duration * np.maximum(vertex_area(model, x), 1e-30))
     return {
+        "force": (received / duration).astype(np.float32),
         "pressure": pressure.astype(np.float32),
         "penetration": penetration,
         "partner": partner,

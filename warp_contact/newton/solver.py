@@ -1,0 +1,263 @@
+"""``SolverContactSurface``: contact surfaces as a solver of Newton."""
+
+from dataclasses import dataclass
+
+import newton
+import numpy as np
+import warp as wp
+from newton.solvers import SolverBase
+
+from warp_contact import Simulation, checks
+from warp_contact.newton.layout import Soft, Solid, lay_out
+from warp_contact.newton.refusals import numbers
+from warp_contact.scene.pose import rigid_motion_of
+from warp_contact.scene.scene import rotation_matrix
+
+SAME = 1e-6  # relative: of a length of the step
+
+
+def field(dtype):
+    """An observable of each particle."""
+    every = newton.Model.AttributeFrequency.PARTICLE
+    return SolverBase.Observables.field(dtype=dtype, frequency=every)
+
+
+class SolverContactSurface(SolverBase):
+    """Soft bodies of tets, rigid bodies and static shapes that touch by contact surfaces.
+
+    A step of Newton is a frame here: it is divided into as many steps as are stable. How many is
+    decided on the host, so that ``step`` cannot be captured: it raises RuntimeError within a
+    capture. Contacts are found by the solver itself: ``contacts`` and ``control`` are not looked
+    at, nor are radii of particles, nor stiffness and damping of contacts.
+
+    Tets of a piece are a body with the material of SolverVBD: Lame parameters k_mu and k_lambda,
+    and a damping of the same shear stress as k_damp. Its mass is that of its particles, divided
+    among them by volume. Particles without mass, or not active, are held: what the user writes
+    into their positions is where they are at the end of the step, and they move by their
+    velocities. So are bodies that are kinematic or without mass, by ``body_q`` alone. Friction
+    between two bodies, or a body and a shape, is the mean of theirs; soft ones have
+    ``model.soft_contact_mu``. Groups and filters of collisions are not looked at, nor is contact
+    of a body with itself.
+
+    ``particle_f`` acts as an impulse at the beginning of the step, ``body_f`` during the step.
+    """
+
+    SUPPORTED_OBSERVABLES = frozenset(
+        {"particle_contact_f", "particle_pressure", "particle_penetration"}
+    )
+
+    class ObservableKind(SolverBase.ObservableKind):
+        """Of each particle, beside those of Newton."""
+
+        PARTICLE_CONTACT_F = "particle_contact_f"
+        PARTICLE_PRESSURE = "particle_pressure"
+        PARTICLE_PENETRATION = "particle_penetration"
+
+    @dataclass(eq=False)
+    class Observables(SolverBase.Observables):
+        """What contact did to each particle, soft against soft too.
+
+        Attributes:
+            particle_contact_f: mean contact force of the step [N], shape (particle_count,)
+            particle_pressure: the same over the area of the surface there [Pa]
+            particle_penetration: how deep it was inside another body before it was put right [m]
+        """
+
+        # They return fields, not defaults that are shared.
+        particle_contact_f: wp.array | None = field(wp.vec3)  # noqa: RUF009
+        particle_pressure: wp.array | None = field(wp.float32)  # noqa: RUF009
+        particle_penetration: wp.array | None = field(wp.float32)  # noqa: RUF009
+
+    def __init__(
+        self,
+        model: newton.Model,
+        *,
+        integrator: str = "explicit",
+        thickness: float | None = None,
+    ):
+        """Translate the model.
+
+        Args:
+            model: as finalized, at rest
+            integrator: ``explicit``, ``implicit`` or ``auto``, as of ``wc.Simulation``
+            thickness: of the shells that stand for meshes, capsules and finite planes [m]; by
+                default 0.05 of the diagonal of each
+
+        Raises:
+            ValueError: naming what cannot be simulated: joints, springs, cloth, grains, skins,
+                bodies of several shapes or materials, unknown shapes, a model with gradients
+        """
+        super().__init__(model)
+        if thickness is not None:
+            thickness = checks.positive(thickness, "thickness")
+        self._integrator, self._thickness = integrator, thickness
+        self._layout = lay_out(model, thickness)
+        self.simulation: Simulation | None = None
+
+    def step(self, state_in, state_out, control, contacts, dt, *, observables=None) -> None:
+        """Go on by ``dt`` [s] from one state to the other, which may be the same.
+
+        Where a state is not what the last step gave, bodies are put there, without motion. The
+        first step, and one of another ``dt``, lays out a simulation: half a second.
+
+        Raises:
+            RuntimeError: within a capture
+            SimulationError: no step is stable, or a number is not finite
+        """
+        if self.device.is_capturing:
+            raise RuntimeError(
+                "SolverContactSurface.step decides on the host how many steps it takes, and cannot "
+                "be captured: call it in every frame"
+            )
+        self.validate_observables(observables)
+        sim = self._at(checks.positive(dt, "dt"))
+        try:
+            given = self._take(sim, state_in, dt)
+            sim.step_frame()
+            self._give(sim, state_out, *given)
+        except BaseException:
+            self._lose()
+            raise
+        if observables is not None and observables.kinds:
+            self._observe(sim, observables)
+
+    def reset(self, state, world_mask=None, flags=None) -> None:
+        """Forget what was before; the next step begins where its state is, as the first one did.
+
+        With ``world_mask`` in these worlds alone; the state itself is left as it is.
+        """
+        mask = self._normalize_reset_world_mask(world_mask)
+        if self.simulation is None:
+            return
+        if mask is None:
+            self._begin(self.simulation)
+            return
+        chosen = mask.numpy()  # the last one is that of world -1
+        self._jump |= chosen[numbers(self.model.particle_world).astype(int)]
+        self._jump_body |= chosen[numbers(self.model.body_world).astype(int)]
+
+    def notify_model_changed(self, flags) -> None:
+        """Translate the model anew; the next step begins where its state is.
+
+        Raises:
+            ValueError: as for a new solver
+        """
+        self._layout = lay_out(self.model, self._thickness)
+        self.simulation = None
+
+    def _at(self, dt: float) -> Simulation:
+        """A simulation whose frames are ``dt`` [s] long."""
+        sim = self.simulation
+        if sim is None or abs(sim.fps * dt - 1.0) > SAME:
+            name = str(self.model.device)
+            scene = self._layout.scene
+            sim = Simulation(scene, fps=1.0 / dt, device=name, integrator=self._integrator)
+            self.simulation = sim
+            self._begin(sim)
+        return sim
+
+    def _begin(self, sim: Simulation) -> None:
+        """Begin where the scene does; held ones are put where the state has them."""
+        sim.reset()
+        self._q, self._qd, self._pose, self._twist = (a.copy() for a in self._layout.start)
+        self._jump = np.ones(self.model.particle_count, dtype=bool)
+        self._jump_body = np.ones(self.model.body_count, dtype=bool)
+
+    def _lose(self) -> None:
+        """After an error nothing is known: the next step puts everything where its state has it."""
+        for last in self._q, self._qd, self._pose, self._twist:
+            last[:] = np.nan
+        self._jump[:], self._jump_body[:] = True, True
+
+    def _take(self, sim: Simulation, state, dt: float) -> tuple[np.ndarray, ...]:
+        """Put everything where a state has it; return its positions, poses and their velocities."""
+        arrays = state.particle_q, state.particle_qd, state.body_q, state.body_qd
+        q, qd, poses, twists = (numbers(a) for a in arrays)
+        force, push = numbers(state.particle_f), qd
+        if force.any():
+            push, inv_mass = qd.copy(), sim.model.inv_mass.numpy()
+            for soft in self._layout.soft:
+                own = soft.particles
+                push[own] += dt * force[own] * inv_mass[soft.vertices][:, None]
+        for soft in self._layout.soft:
+            self._take_soft(sim, soft, q, push, dt)
+        wrench = numbers(state.body_f)
+        for solid in self._layout.solid:
+            b = solid.body
+            self._take_solid(sim, solid, poses[b], twists[b], wrench[b])
+        self._jump[:], self._jump_body[:] = False, False
+        return q, qd, poses, twists
+
+    def _take_soft(
+        self, sim: Simulation, soft: Soft, q: np.ndarray, qd: np.ndarray, dt: float
+    ) -> None:
+        own, held, free = soft.particles, soft.held, np.flatnonzero(~soft.held)
+        moved = (q[own] != self._q[own]).any(axis=1) & (~held | self._jump[own])
+        if moved.any():
+            sim.set_positions(soft.index, q[own])
+        if (qd[own[free]] != self._qd[own[free]]).any():
+            sim.set_velocity(soft.index, qd[own[free]], free)
+        if held.any():
+            goal = q[own[held]] + dt * qd[own[held]]
+            if (goal != sim.positions(soft.index)[held]).any():
+                sim.move_to(soft.index, goal, held)
+
+    def _take_solid(
+        self, sim: Simulation, solid: Solid, q: np.ndarray, qd: np.ndarray, force: np.ndarray
+    ) -> None:
+        b, k = solid.body, solid.index
+        moved = (q != self._pose[b]).any()
+        if moved and solid.driven and not self._jump_body[b]:
+            sim.move_to(k, pose=(q[:3], q[3:]))
+        elif moved:
+            sim.set_pose(k, q[:3], q[3:])
+        if solid.driven:
+            return
+        if moved or (qd != self._twist[b]).any():
+            x = sim.positions(k).astype(np.float64)
+            turn, centre = sim.pose(k), self.model.body_com.numpy()[b].astype(np.float64)
+            arm = x - _placed(centre, *turn)
+            sim.set_velocity(k, qd[:3] + np.cross(qd[3:], arm))
+        if force.any():
+            sim.apply(k, force[:3], force[3:])
+
+    def _give(self, sim: Simulation, state, *given: np.ndarray) -> None:
+        """Write a state; what is not simulated is as ``given``."""
+        x, v = sim.positions(), sim.velocities()
+        self._q, self._qd, self._pose, self._twist = (a.copy() for a in given)
+        for soft in self._layout.soft:
+            own, free = soft.particles, ~soft.held  # those of held ones are the user's
+            self._q[own] = x[soft.vertices]
+            self._qd[own[free]] = v[soft.vertices][free]
+        state.particle_q.assign(self._q)
+        state.particle_qd.assign(self._qd)
+        if self.model.body_count:
+            for solid in (s for s in self._layout.solid if not s.driven):
+                self._give_solid(sim, solid, v[solid.vertices])
+            state.body_q.assign(self._pose)
+            state.body_qd.assign(self._twist)
+
+    def _give_solid(self, sim: Simulation, solid: Solid, v: np.ndarray) -> None:
+        place = sim.pose(solid.index)
+        centre = _placed(self.model.body_com.numpy()[solid.body].astype(np.float64), *place)
+        x = sim.positions(solid.index)
+        motion = rigid_motion_of(x, v, np.ones(len(x)), centre)
+        self._pose[solid.body] = np.concatenate(place)
+        self._twist[solid.body] = np.concatenate(motion)
+
+    def _observe(self, sim: Simulation, observables) -> None:
+        fields = sim.contact_fields()
+        names = {"particle_contact_f": "force", "particle_pressure": "pressure"}
+        names |= {"particle_penetration": "penetration"}
+        for kind, name in names.items():
+            if observables.is_requested(kind):
+                array = getattr(observables, kind)
+                out = np.zeros((self.model.particle_count, *fields[name].shape[1:]), np.float32)
+                for soft in self._layout.soft:
+                    out[soft.particles] = fields[name][soft.vertices]
+                array.assign(out)
+
+
+def _placed(point: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """A point of a body's frame in the world [m]."""
+    return rotation_matrix(rotation) @ point + position

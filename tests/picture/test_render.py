@@ -163,7 +163,7 @@ def test_a_cut_that_is_no_plane_is_refused(cut, tmp_path):
 
 
 def test_the_inside_of_a_mesh_has_the_colour_of_most_of_its_points():
-    drawing = render.Drawing((), (3, 2), np.zeros((0, 3)))
+    drawing = render.Drawing((), (3, 2), np.zeros((0, 3)), ())
     colors = np.array([[0.1] * 3, [0.1] * 3, [0.9] * 3, [0.5] * 3, [0.5] * 3])
     np.testing.assert_array_equal(drawing.middle(colors)[:, 0], [0.1, 0.1, 0.1, 0.5, 0.5])
 

@@ -79,7 +79,8 @@ def in_words(prop) -> str:
 def is_own(prim) -> bool:
     """Whether a ``UsdWriter`` has made a shape of what else it writes."""
     above = prim.GetParent()
-    return note(above, "body") is not None and prim.GetName() == above.GetName()
+    surface = note(above, "body") is not None and prim.GetName() == above.GetName()
+    return surface or note(prim, "contacts") is not None
 
 
 def paths_in_short(paths: list[str]) -> str:

@@ -33,7 +33,9 @@ def problems(path) -> list[str]:
         for prim in stage.Traverse():
             if read_note(prim, "body") is not None:
                 found += [f"{prim.GetPath()}: {line}" for line in frame_of(stage, prim)]
-            if prim.IsA(UsdGeom.PointBased):
+            if prim.IsA(UsdGeom.Points) or prim.IsA(UsdGeom.Curves):
+                found += [f"{prim.GetPath()}: {line}" for line in loose_points(stage, prim)]
+            elif prim.IsA(UsdGeom.PointBased):
                 found += [f"{prim.GetPath()}: {line}" for line in point_based(stage, prim)]
         found += [d.commentary for d in delegate.TakeUncoalescedDiagnostics()]
         # Last: the validators take the template of the clips for a missing file and warn.
@@ -141,6 +143,21 @@ def point_based(stage: Usd.Stage, prim: Usd.Prim) -> list[str]:
         when = "" if time == DEFAULT else f" at frame {time:g}"
         found += [line + when for line in at_time(geometry, time, n, wanted)]
     return found + (tet_mesh(prim, n) if prim.IsA(UsdGeom.TetMesh) else mesh(prim, n))
+
+
+def loose_points(stage: Usd.Stage, prim: Usd.Prim) -> list[str]:
+    """What is wrong with points or curves, of which each frame may have another number."""
+    geometry, found = UsdGeom.PointBased(prim), odd_samples(stage, prim)
+    primvars = UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()
+    wanted = [p for p in primvars if p.GetInterpolation() == UsdGeom.Tokens.vertex]
+    for time in frame_numbers(stage):
+        n = len(geometry.GetPointsAttr().Get(time) or ())
+        lines = at_time(geometry, time, n, [(p, n) for p in wanted]) if n else []
+        if prim.IsA(UsdGeom.Curves):
+            counts = UsdGeom.Curves(prim).GetCurveVertexCountsAttr().Get(time)
+            lines += [f"curves do not fit its {n} points"] if sum(counts or ()) != n else []
+        found += [f"{line} at frame {time}" for line in lines]
+    return found
 
 
 def at_time(geometry: UsdGeom.PointBased, time, n: int, primvars: list) -> list[str]:

@@ -40,8 +40,10 @@ def check_layers(root: Path, manifest: Sdf.Layer, labels: list[str]) -> None:
             raise ValueError(f"{root} has other bodies: {', '.join(found)}")
 
 
-def check_frames(folder: Path, frames: range, lengths: dict[str, int]) -> list[dict]:
-    """See that each frame has its values, ``lengths`` by path; return the notes of each.
+def check_frames(folder: Path, frames: range, lengths: dict[str, int | None]) -> list[dict]:
+    """See that each frame has its values; return the notes of each.
+
+    ``lengths`` are their numbers by path, None for any number.
 
     Raises:
         ValueError: one is missing, damaged, or another one
@@ -60,6 +62,7 @@ def check_frames(folder: Path, frames: range, lengths: dict[str, int]) -> list[d
                 raise ValueError(f"{path} is not frame {frame}: {name} has values at {times}")
             value = layer.QueryTimeSample(name, frame)
             found = np.zeros(0) if value is None else numbers(value)
+            n = len(found) if n is None and value is not None else n
             if len(found) != n or not np.isfinite(found).all():
                 raise ValueError(f"{path} is damaged: {name} has not {n} finite values")
         notes.append(layer.customLayerData)

@@ -11,9 +11,11 @@ from warp_contact.usd.physics import Materials, add_body, add_frame, add_scene, 
 PALETTE = ("4c86b8", "6fa868", "dfb84e", "9579b6", "48a39b", "c9a57d", "c487a6", "71849f")  # sRGB
 FIXED, GROUND = "c4c4c0", "b9b9b5"  # sRGB
 WARM, HOT = "f08a24", "c3241c"  # sRGB, at half and at full pressure
+SHADES = 128  # colours of a body, from none to full pressure: their differences fit a byte
 ROOM = 4.0  # half the width of a drawn half-space, in scene diagonals
 FOV = 28.0  # vertical angle of view [degrees]
-TAKEN = ("Looks", "view", "physics", "render", "sim")  # names of prims that are no body
+# Names of prims that are no body.
+TAKEN = ("Looks", "view", "physics", "render", "sim", "contacts", "forces")
 FLAGS = ("velocities", "tets", "flatten", "animate_tets", "resume")  # of a UsdWriter
 
 
@@ -52,11 +54,6 @@ class Part:
         """Whether it keeps its shape."""
         return self.rest is not None
 
-    @property
-    def n_vert(self) -> int:
-        """Number of its vertices."""
-        return self.verts[1] - self.verts[0]
-
 
 def check_options(sim, view, pressure_scale, flags: tuple) -> None:
     """Refuse options of a ``UsdWriter`` that cannot work, by ValueError; ``flags`` as ``FLAGS``."""
@@ -81,12 +78,18 @@ def linear(srgb: str) -> np.ndarray:
 WARM_COLOR, HOT_COLOR = linear(WARM), linear(HOT)
 
 
-def heated(base: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-    """Base colours blended over orange to red by a pressure of 0 ... 1, shape (n, 3).
+def shades(pressure: np.ndarray) -> np.ndarray:
+    """Which of the ``heated`` colours shows a pressure of 0 ... 1, int32 (n,).
 
     The square root lets light contact show too.
     """
-    s = np.sqrt(np.clip(pressure, 0.0, 1.0)).astype(np.float32)[:, None]
+    s = np.sqrt(np.clip(pressure, 0.0, 1.0))
+    return np.rint((SHADES - 1) * s).astype(np.int32)
+
+
+def heated(base: np.ndarray) -> np.ndarray:
+    """A base colour blended over orange to red, shape (SHADES, 3)."""
+    s = np.linspace(0.0, 1.0, SHADES)[:, None]
     low, high = np.minimum(2.0 * s, 1.0), np.maximum(2.0 * s - 1.0, 0.0)
     color = base + low * (WARM_COLOR - base) + high * (HOT_COLOR - WARM_COLOR)
     return color.astype(np.float32)
@@ -204,8 +207,10 @@ def add_surface(stage, part: Part, x: np.ndarray, look) -> None:
     mesh = add_mesh(stage, part.surface, x[part.ids], part.faces, look)
     api, types = UsdGeom.PrimvarsAPI(mesh), Sdf.ValueTypeNames
     n = len(part.ids)
+    colors = api.CreatePrimvar("displayColor", types.Color3fArray, UsdGeom.Tokens.vertex)
+    colors.Set(Vt.Vec3fArray.FromNumpy(heated(part.color)))
+    colors.SetIndices(Vt.IntArray(n))
     defaults = (
-        ("displayColor", types.Color3fArray, np.tile(part.color, (n, 1))),
         ("contact:pressure", types.FloatArray, np.zeros(n, dtype=np.float32)),
         ("contact:penetration", types.FloatArray, np.zeros(n, dtype=np.float32)),
         ("contact:partner", types.IntArray, np.full(n, -1, dtype=np.int32)),

@@ -13,7 +13,8 @@ Of a rigid body the prim moves, and its points are written once, in the frame of
 
 Each surface carries ``primvars:contact:pressure`` [Pa], ``penetration`` [m] and ``partner``: the
 index of the other body, n_body + p for half-space p, -1 for none. Pressure and penetration are
-rounded to a thousandth of their largest value on the body, which packs them to half the size.
+rounded to a thousandth of their largest value on the body, to a 250th on those of 1000 points or
+some more, so that they pack to half the size. Colours are indices into a palette.
 """
 
 from pathlib import Path
@@ -22,14 +23,14 @@ import numpy as np
 from pxr import Sdf, Tf, UsdGeom, Vt
 
 from warp_contact.files import replacing
+from warp_contact.usd.contacts import ContactArrows
+from warp_contact.usd.fields import field_types, field_values, hydrostatic
 from warp_contact.usd.folder import TOPOLOGY, RunFolder, frame_file, frame_files
 from warp_contact.usd.kept import check_frames, check_layers, first_frame
 from warp_contact.usd.motion import motion, motion_types, numbers, velocities, velocity_types
-from warp_contact.usd.prims import check_options, heated, parts, topology
+from warp_contact.usd.prims import check_options, parts, shades, topology
 from warp_contact.usd.reader import open_stage
 from warp_contact.usd.skin import add_renders, copy_textures, render_types, render_values, renders
-
-LEVELS = 1000  # distinct values of a scalar in a frame: the crate format packs up to about 1024
 
 
 class UsdWriter:
@@ -56,6 +57,7 @@ class UsdWriter:
         flatten: bool = False,
         *,
         animate_tets: bool = False,
+        contacts: bool | float = False,
         view: tuple | None = None,
         pressure_scale: float | None = None,
         overwrite: bool = False,
@@ -71,31 +73,33 @@ class UsdWriter:
             tets: write each body's TetMesh, purpose guide
             flatten: ``close()`` also writes everything into one ``<name>.usdc``
             animate_tets: time-sample the points of the TetMeshes, inner vertices included
+            contacts: write points and arrows of contact forces; a number is their length [m/N]
             view: eye and target [m] of a camera to write
             pressure_scale: pressure [Pa] drawn as fully hot; None takes twice the hydrostatic
                 pressure over the scene's size, or without gravity the highest pressure so far
             overwrite: replace what is there, when the first frame is written
-            resume: continue after frame ``sim.frame`` of the earlier file, written with the
-                same arguments; the frames after it are removed
+            resume: keep the frames up to ``sim.frame`` of an earlier run with the same arguments
 
         Raises:
             OSError: something is there, or another writer at work; it cannot be written to
             ValueError: the path cannot be that of a root layer; what is to be resumed is damaged
         """
         check_options(sim, view, pressure_scale, (velocities, tets, flatten, animate_tets, resume))
+        self.arrows = ContactArrows(sim, contacts) if contacts is not False else None
         self.folder = _folder(path, overwrite, resume)
         self.sim, self.velocities, self.flatten = sim, velocities, flatten
         self.animate_tets = animate_tets and tets
-        self.parts, self.start, self.end = parts(sim.model), None, None
-        self.renders, self.notes = renders(self.parts, sim), []
-        self.base = np.concatenate([np.tile(p.color, (p.n_vert, 1)) for p in self.parts])
+        self.parts, self.start, self.end, self.notes = parts(sim.model), None, None, []
+        self.renders = renders(self.parts, sim)
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
-        self.grows, self.layer = self.scale == 0.0, self._declare()
         self._begin(topology(self.parts, sim, tets, view), resume)
 
     def _begin(self, prims: Sdf.Layer, resume: bool) -> None:
         """Write what does not change."""
         try:
+            self.grows, self.layer = self.scale == 0.0, self._declare()
+            if self.arrows:
+                self.arrows.define(prims)
             if resume:
                 self._check()
             copy_textures(self.renders, self.folder.now)
@@ -137,7 +141,8 @@ class UsdWriter:
             if self.end is not None:
                 self.layer.EraseTimeSample(path, self.end)
             self.layer.SetTimeSample(path, frame, value)
-        self.layer.customLayerData = {"pressureScale": self.scale, "note": note}
+        lengths = {"forceScale": self.arrows.scale} if self.arrows else {}
+        self.layer.customLayerData = {"pressureScale": self.scale, "note": note} | lengths
         export(self.layer, frame_file(self.folder.now, frame))
         start = frame if self.start is None else self.start
         self._write_root(start, frame)
@@ -156,10 +161,14 @@ class UsdWriter:
         self.start, self.end = first_frame(self.root), self.sim.frame
         check_layers(self.root, self.layer, list(self.sim.model.labels))
         lengths = {path: len(numbers(value)) for path, value in self._values()}
+        if self.arrows:
+            lengths |= dict.fromkeys(self.arrows.types())  # any number of contacts
         kept = check_frames(self.root.parent, range(self.start, self.end + 1), lengths)
         if not kept:
             raise ValueError(f"{self.root} begins at frame {self.start}, after {self.end}")
         self.scale = kept[-1].get("pressureScale", self.scale)
+        if self.arrows:
+            self.arrows.scale = kept[-1].get("forceScale", self.arrows.scale)
         self.notes = [data.get("note", "") for data in kept]
 
     def _cut(self) -> None:
@@ -177,39 +186,28 @@ class UsdWriter:
         fields = self.sim.contact_fields()
         if self.grows:
             self.scale = max(self.scale, float(fields["pressure"].max(initial=0.0)))
-        color = heated(self.base, fields["pressure"] / (self.scale or 1.0))
+        shade = shades(fields["pressure"] / (self.scale or 1.0))
         for part in self.parts:
-            mesh = f"{part.surface}."
             yield from motion(part, self.sim, x)
             if v is not None:
                 yield from velocities(part, self.sim, x, v, self.animate_tets)
-            yield mesh + "primvars:displayColor", Vt.Vec3fArray.FromNumpy(color[part.ids])
-            for name in "pressure", "penetration":
-                value = Vt.FloatArray.FromNumpy(rounded(fields[name][part.ids]))
-                yield f"{mesh}primvars:contact:{name}", value
-            partner = np.ascontiguousarray(fields["partner"][part.ids], dtype=np.int32)
-            yield mesh + "primvars:contact:partner", Vt.IntArray.FromNumpy(partner)
+            yield from field_values(part, shade, fields)
             if self.animate_tets and not part.is_rigid:
                 points = Vt.Vec3fArray.FromNumpy(x[slice(*part.verts)])
                 yield f"{part.path}/sim.points", points
                 yield f"{part.path}/sim.extent", UsdGeom.PointBased.ComputeExtent(points)
         for render in self.renders:
             yield from render_values(render, self.sim)
+        if self.arrows:
+            yield from self.arrows.values(self.sim)
 
     def _declare(self) -> Sdf.Layer:
         """A layer that holds every attribute of a frame, without values."""
         layer = Sdf.Layer.CreateAnonymous(".usdc")
         layer.timeCodesPerSecond = layer.framesPerSecond = self.sim.fps
         types = Sdf.ValueTypeNames
-        primvars = {
-            "displayColor": types.Color3fArray,
-            "contact:pressure": types.FloatArray,
-            "contact:penetration": types.FloatArray,
-            "contact:partner": types.IntArray,
-        }
         for part in self.parts:
-            mesh, attributes = f"{part.surface}.", motion_types(part)
-            attributes |= {f"{mesh}primvars:{name}": kind for name, kind in primvars.items()}
+            attributes = motion_types(part) | field_types(part)
             if self.velocities:
                 attributes |= velocity_types(part, self.sim.model, self.animate_tets)
             if self.animate_tets and not part.is_rigid:
@@ -218,6 +216,8 @@ class UsdWriter:
             declare(layer, attributes)
         for render in self.renders:
             declare(layer, render_types(render))
+        if self.arrows:
+            declare(layer, self.arrows.types())
         return layer
 
     def _write_root(self, start: int, end: int) -> None:
@@ -260,21 +260,6 @@ def export(layer: Sdf.Layer, path: Path) -> None:
             is_written, reason = False, first.split(" : ")[-1].strip("'")
         if not is_written:
             raise OSError(f"cannot write {path}: {reason}")
-
-
-def rounded(value: np.ndarray) -> np.ndarray:
-    """The values on a scale of at most ``LEVELS`` steps between 0 and their largest."""
-    value = np.ascontiguousarray(value, dtype=np.float32)
-    step = np.float32(np.abs(value).max(initial=0.0) / (LEVELS - 1))
-    return np.rint(value / step) * step if step > 0.0 else value
-
-
-def hydrostatic(sim) -> float:
-    """Twice the pressure [Pa] at the bottom of a column as high as the scene; 0 without gravity."""
-    densities = [getattr(material, "density", 0.0) or 0.0 for material in sim.model.materials]
-    x = sim.positions()
-    size = float(np.linalg.norm(np.ptp(x, axis=0)))
-    return 2.0 * max(densities, default=0.0) * float(np.linalg.norm(sim.model.gravity)) * size
 
 
 def _folder(path, overwrite: bool, resume: bool) -> RunFolder:

@@ -115,14 +115,17 @@ def test_an_installed_wheel_simulates_and_has_its_scenes_and_version(clean, whee
 def test_what_needs_an_extra_names_it(clean, tmp_path):
     (tmp_path / "a.msh").write_text("$MeshFormat")
     lacking = ["wc.TetMesh.load('a.msh')", "animate([], 'a.webp')"]
-    lacking += ["animate([], 'a.mp4')", "plot([], 'a.png')"]
+    lacking += ["animate([], 'a.mp4')", "plot([], 'a.png')", "Viewer('.')"]
     lacking.append("__import__('warp_contact.newton')")
     script = "import warp_contact as wc\nfrom warp_contact.picture.files import animate\n"
     script += "from warp_contact.picture.plot import plot\n"
+    script += "from warp_contact.picture.viewer import Viewer\n"
     script += "".join(f"try: {code}\nexcept Exception as e: print(e)\n" for code in lacking)
     (tmp_path / "a.py").write_text(script)
     said = run(clean / "python", "-I", tmp_path / "a.py", cwd=tmp_path).splitlines()
-    for extra, line in zip(("mesh", "render", "video", "plot", "newton"), said, strict=True):
+    for extra, line in zip(
+        ("mesh", "render", "video", "plot", "view", "newton"), said, strict=True
+    ):
         assert f"pip install 'warp_contact[{extra}]'" in line
 
 

@@ -1,4 +1,4 @@
-"""The command line: ``warp-contact run | scenes | info | plot | render | validate``.
+"""The command line: ``warp-contact run | scenes | info | plot | render | view | validate``.
 
 Exit codes: 0 done, 1 failed on the way, 2 wrong usage or input, 128 + its number after a signal
 (130 interrupted, 143 terminated, 129 hung up). An error is one line on stderr; ``--debug`` before
@@ -89,6 +89,11 @@ def parser() -> argparse.ArgumentParser:
     command.set_defaults(command=commands.info)
     add_plot(group)
     add_render(group)
+    command = group.add_parser("view", help="show a run in a browser, also while it is at work")
+    command.add_argument("file", metavar="DIR", help="run directory or USD file")
+    port = "of the server on this machine, or the next free one; default: %(default)s"
+    command.add_argument("--port", type=count, default=8080, metavar="N", help=port)
+    command.set_defaults(command=commands.view)
     command = group.add_parser("validate", help="check a USD file")
     command.add_argument("file", metavar="DIR", help="run directory or USD file")
     command.set_defaults(command=commands.validate)

@@ -2,6 +2,7 @@
 
 import importlib
 import importlib.util
+import signal
 from pathlib import Path
 
 import warp as wp
@@ -11,6 +12,7 @@ from warp_contact.errors import UsageError
 from warp_contact.picture import plot as figures
 from warp_contact.picture.files import NEEDS, animate
 from warp_contact.picture.render import render
+from warp_contact.picture.viewer import Viewer
 from warp_contact.scene.files import in_child, regular
 from warp_contact.scene.mesh import TetMesh
 from warp_contact.usd.check import problems
@@ -146,6 +148,22 @@ def draw(args) -> int:
         animate(pictures, out / f"{root.stem}.{kind}", rate)
         if not args.quiet:
             print(out / f"{root.stem}.{kind}")
+    return 0
+
+
+def view(args) -> int:
+    """Show a run in a browser, until Ctrl+C."""
+    if not Path(args.file).exists():
+        raise UsageError(f"no such file: {args.file}")
+    with usd_errors(args.file):
+        readable_stage(Path(args.file), "all")
+        viewer = Viewer(args.file, args.port)
+        print(f"{viewer.url} (Ctrl+C ends it)", flush=True)
+        try:
+            viewer.run()
+        except KeyboardInterrupt as stop:
+            if getattr(stop, "number", signal.SIGINT) != signal.SIGINT:
+                raise
     return 0
 
 

@@ -10,6 +10,7 @@ from warp_contact.usd.check import problems
 
 MESH = wc.box((0.1, 0.12, 0.08), 2)
 TURN = (0.1, 0.2, 0.3, 0.9)
+WHOLE = {"velocities": True, "animate_tets": True}
 
 
 def own_scene() -> wc.Scene:
@@ -40,12 +41,10 @@ def written(place, scene: wc.Scene, frames: int = 4, **options) -> wc.Simulation
     return sim
 
 
-WHOLE = {"velocities": True, "animate_tets": True}
-
-
-def test_what_is_written_is_read_back(tmp_path):
+@pytest.mark.parametrize("options", [{}, WHOLE], ids=["surfaces", "whole"])
+def test_what_is_written_is_read_back(options, tmp_path):
     scene = own_scene()
-    written(tmp_path / "run", scene, 1)
+    written(tmp_path / "run", scene, 1, **options)
     found = wc.Scene.from_usd(tmp_path / "run")
     assert found.not_read == []
     assert (found.gravity, found.friction, found.plane_friction) == (scene.gravity, 0.4, [0.9])
@@ -68,6 +67,8 @@ def test_what_is_written_is_read_back(tmp_path):
 
 def test_a_run_goes_on_from_its_last_frame(tmp_path):
     sim = written(tmp_path / "run", own_scene(), **WHOLE)
+    with pytest.raises(ValueError, match="has frames 1 to 4, not 5"):
+        wc.Scene.from_usd(tmp_path / "run", at=5)
     scene = wc.Scene.from_usd(tmp_path / "run", at="last")
     assert scene.not_read == []
     again = wc.Simulation(scene)
@@ -287,6 +288,8 @@ def test_a_stage_that_makes_no_scene_is_refused_with_what_to_do(tmp_path):
         wc.Scene.from_usd(tmp_path)
     with pytest.raises(ValueError, match="at, which may be 'start' or 'last' too, 'end'"):
         wc.Scene.from_usd(tmp_path / "a.usda", at="end")
+    with pytest.raises(ValueError, match="does not say its startTimeCode"):
+        wc.Scene.from_usd(tmp_path / "a.usda", at="last")
 
 
 def test_quaternions_of_moments_are_those_of_usd(tmp_path):
@@ -296,3 +299,25 @@ def test_quaternions_of_moments_are_those_of_usd(tmp_path):
     mass.CreatePrincipalAxesAttr(Gf.Quatf(TURN[3], *TURN[:3]))
     found = np.array(read(stage).bodies[0].material.inertia)
     np.testing.assert_allclose(found, turn @ np.diag([0.03, 0.04, 0.05]) @ turn.T, atol=1e-8)
+
+
+def test_what_a_stage_does_not_say_of_a_mass_is_that_of_the_shape(tmp_path):
+    stage = foreign(tmp_path / "a.usda")
+    die, soft = (stage.GetPrimAtPath(f"/World/{name}") for name in ("die", "soft"))
+    UsdPhysics.MassAPI(die).CreateCenterOfMassAttr((1.0, 0.0, 0.0))  # 2 cm, as it is scaled by 2
+    soft.CreateAttribute("omniphysics:mass", Sdf.ValueTypeNames.Float).Set(3000.0)
+    given, jelly = (body.material for body in read(stage).bodies)
+    assert jelly.density * MESH.volume == pytest.approx(3.0, rel=1e-6)
+    assert (given.mass, given.centre) == (5.0, pytest.approx((0.02, 0.0, 0.0), abs=1e-9))
+    full = wc.Rigid(5.0 / (8.0 * MESH.volume)).solid(2.0 * MESH.vertices, MESH.tets)
+    wanted = full.inertia + 5.0 * 0.02**2 * np.diag([0.0, 1.0, 1.0])
+    np.testing.assert_allclose(given.inertia, wanted, atol=1e-8)  # float32
+
+
+def test_names_that_are_taken_are_numbered(tmp_path):
+    stage = foreign(tmp_path / "a.usda")
+    for path in "/other/soft", "/plane0":
+        tets(stage, path).AddAppliedSchema("PhysicsDeformableBodyAPI")
+        UsdGeom.Xformable(stage.GetPrimAtPath(path)).AddTranslateOp().Set((0.0, len(path), 900.0))
+    scene = read(stage, material=wc.NeoHookean(1e5, 0.3, 1000.0))
+    assert [body.label for body in scene.bodies] == ["die", "soft", "soft_1", "plane0_1"]

@@ -3,6 +3,7 @@
 import io
 import json
 import warnings
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,11 +87,12 @@ def add_body(scene, info: dict, arrays: dict, material, said: list[str]) -> None
 
 
 def label_of(scene, info: dict) -> str:
-    """A label that no other body has."""
-    taken, label, n = {body.label for body in scene.bodies}, info["label"], 1
-    while label in taken:
-        label, n = f"{info['label']}_{n}", n + 1
-    return label
+    """A label that no other body has, and no plane."""
+    label = info["label"][: checks.LONGEST - 10]
+    for n in range(len(scene.bodies) + 2):
+        with suppress(ValueError):
+            return scene.new_label(f"{label}_{n}" if n else label)
+    return scene.new_label(label)  # says why not
 
 
 def solid_of(info: dict, mesh: TetMesh, material, said: list[str]):

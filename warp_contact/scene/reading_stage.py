@@ -33,7 +33,7 @@ class Reader:
         self.stage = stage
         self.said: list[str] = []
         self.seen: set = set()
-        self.time = None if at == "start" else float(stage.GetEndTimeCode() if at == "last" else at)
+        self.time = None if at == "start" else self._frame(at)
         self.length, self.kilograms = self._unit("metersPerUnit"), self._unit("kilogramsPerUnit")
         self.turn = np.eye(3)
         if not stage.HasAuthoredMetadata("upAxis"):
@@ -41,6 +41,16 @@ class Reader:
         elif UsdGeom.GetStageUpAxis(stage) == "Y":
             self.turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
         self.prims = list(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
+
+    def _frame(self, at: str) -> float:
+        """The time code of the last frame, or of one that is given by its number."""
+        if not self.stage.HasAuthoredTimeCodeRange():
+            raise Unfit("does not say its startTimeCode and endTimeCode: only at='start' is known")
+        first, last = self.stage.GetStartTimeCode(), self.stage.GetEndTimeCode()
+        time = last if at == "last" else float(at)
+        if not first <= time <= last:
+            raise Unfit(f"has frames {first:g} to {last:g}, not {time:g}")
+        return time
 
     def _unit(self, key: str) -> float:
         """Metres or kilograms per unit; a kilogram is usual."""

@@ -120,7 +120,7 @@ class Scene:
         Raises:
             ValueError: naming the body, for input that cannot be simulated
         """
-        label = self._new_label(label)
+        label = self.new_label(label)
         try:
             _check_shape(mesh, material, label, render)
             world, friction = checks.count(world, "world", least=0), _coefficient(friction)
@@ -134,7 +134,7 @@ class Scene:
         self._labels.add(label)
         return body
 
-    def _new_label(self, label: str | None) -> str:
+    def new_label(self, label: str | None) -> str:
         """A label that no body has; raises ValueError for one that is taken or that of a plane."""
         self._refuse_if_frozen("a body")
         label = f"body{len(self.bodies)}" if label is None else checks.label(label, "label")

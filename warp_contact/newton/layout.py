@@ -174,7 +174,7 @@ def _material(
     free = mass > 0.0
     density = float(mass[free].sum() / share[free].sum()) if free.any() else 1.0
     young, ratio = mu * (3.0 * lam + 2.0 * mu) / (lam + mu), 0.5 * lam / (lam + mu)
-    return NeoHookean(young, ratio, density, damping=2.0 * damping / mu)
+    return NeoHookean(young, ratio, density, damping=4.0 * damping / young)
 
 
 def _add_solids(

@@ -31,13 +31,13 @@ class SolverContactSurface(SolverBase):
     at, nor are radii of particles, nor stiffness and damping of contacts.
 
     Tets of a piece are a body with the material of SolverVBD: Lame parameters k_mu and k_lambda,
-    and a damping of the same shear stress as k_damp. Its mass is that of its particles, divided
-    among them by volume. Particles without mass, or not active, are held: what the user writes
-    into their positions is where they are at the end of the step, and they move by their
-    velocities. So are bodies that are kinematic or without mass, by ``body_q`` alone. Friction
-    between two bodies, or a body and a shape, is the mean of theirs; soft ones have
-    ``model.soft_contact_mu``. Groups and filters of collisions are not looked at, nor is contact
-    of a body with itself.
+    and a damping time 4 k_damp / E, with which a bar that stretches has the same viscous stress.
+    Its mass is that of its particles, divided among them by volume. Particles without mass, or not
+    active, are held: what the user writes into their positions is where they are at the end of the
+    step, and they move by their velocities. So are bodies that are kinematic or without mass, by
+    ``body_q`` alone. Friction between two bodies, or a body and a shape, is the mean of theirs;
+    soft ones have ``model.soft_contact_mu``. Groups and filters of collisions are not looked at,
+    nor is contact of a body with itself.
 
     ``particle_f`` acts as an impulse at the beginning of the step, ``body_f`` during the step.
     """

@@ -3,7 +3,7 @@
 import numpy as np
 from pxr import UsdGeom
 
-from warp_contact.usd.prims import heated
+from warp_contact.usd.prims import heated, shades
 
 LEVELS = 8  # colours of pressures
 YELLOW = 0.9, 0.65, 0.25  # linear colour of the lowest level
@@ -41,7 +41,7 @@ def hot(x: np.ndarray, tris: np.ndarray, pressure: np.ndarray, most: float) -> l
 
 def level_colors() -> np.ndarray:
     """Linear colour of each level, shape (LEVELS, 3)."""
-    return heated(np.tile(np.float32(YELLOW), (LEVELS, 1)), np.linspace(0.0, 1.0, LEVELS) ** 2)
+    return heated(np.float32(YELLOW))[shades(np.linspace(0.0, 1.0, LEVELS) ** 2)]
 
 
 def contact_forces(

@@ -58,10 +58,10 @@ def test_render_surfaces_are_what_is_seen(tmp_path, picture):
         if prim.IsA(UsdGeom.Mesh) and UsdGeom.Imageable(prim).ComputePurpose() == "default"
     }
     assert seen == {
-        f"/World/{name}" for name in ("soft/render", "hard/render", "bare/bare", "ground")
+        f"/World/{name}" for name in ("soft/soft_render", "hard/hard_render", "bare/bare", "ground")
     }
     x, normals = sim.rendered("soft")
-    soft = mesh_at(stage, "/World/soft/render")
+    soft = mesh_at(stage, "/World/soft/soft_render")
     np.testing.assert_array_equal(soft.GetPointsAttr().Get(3), x)
     np.testing.assert_array_equal(np.array(soft.GetNormalsAttr().Get(3)), normals.reshape(-1, 3))
     assert soft.GetNormalsInterpolation() == "faceVarying"
@@ -70,7 +70,7 @@ def test_render_surfaces_are_what_is_seen(tmp_path, picture):
 
 def test_a_rigid_body_has_its_render_surface_written_once(tmp_path):
     sim, stage = written(tmp_path / "run")
-    hard = mesh_at(stage, "/World/hard/render")
+    hard = mesh_at(stage, "/World/hard/hard_render")
     assert hard.GetPointsAttr().GetTimeSamples() == []
     place = np.array(hard.ComputeLocalToWorldTransform(3))
     points = np.array(hard.GetPointsAttr().Get()) @ place[:3, :3] + place[3, :3]
@@ -82,12 +82,12 @@ def test_a_rigid_body_has_its_render_surface_written_once(tmp_path):
 def test_a_texture_is_copied_and_bound(tmp_path, picture):
     _, stage = written(tmp_path / "run", picture)
     assert (tmp_path / "run/texture_0.png").read_bytes() == picture.read_bytes()
-    soft = mesh_at(stage, "/World/soft/render")
+    soft = mesh_at(stage, "/World/soft/soft_render")
     material = UsdShade.MaterialBindingAPI(soft.GetPrim()).ComputeBoundMaterial()[0]
     assert material.ComputeSurfaceSource()[0].GetIdAttr().Get() == "UsdPreviewSurface"
     st = UsdGeom.PrimvarsAPI(soft).GetPrimvar("st")
     assert st.GetInterpolation() == "faceVarying"
-    found = wc.Surface.load(tmp_path / "run/run.usda", prim="/World/soft/render")
+    found = wc.Surface.load(tmp_path / "run/run.usda", prim="/World/soft/soft_render")
     surface = scene_with(picture).bodies[0].render
     np.testing.assert_allclose(found.uv, surface.uv)
     np.testing.assert_allclose(found.normals, surface.normals, atol=1e-2)  # after three frames
@@ -101,7 +101,7 @@ def test_a_run_with_a_texture_goes_on_and_is_replaced(tmp_path, picture):
         usd.write()
     assert (
         len(
-            mesh_at(open_stage(tmp_path / "run"), "/World/soft/render")
+            mesh_at(open_stage(tmp_path / "run"), "/World/soft/soft_render")
             .GetPointsAttr()
             .GetTimeSamples()
         )
@@ -125,7 +125,7 @@ def test_the_ray_caster_takes_the_colours_of_a_texture(tmp_path, picture):
 
     sim, stage = written(tmp_path / "run", picture)
     drawing = Drawing.of(stage)
-    assert str(drawing.meshes[0].GetPath()) == "/World/soft/render"
+    assert str(drawing.meshes[0].GetPath()) == "/World/soft/soft_render"
     colors = drawing.colors(3)[: drawing.sizes[0]]
     x = sim.scene.bodies[0].render.vertices
     left, right = x[:, 0] < -0.02, x[:, 0] > 0.02

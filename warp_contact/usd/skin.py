@@ -1,4 +1,4 @@
-"""Render surfaces in USD: a Mesh ``render`` beside the surface of the tets, which is hidden.
+"""Render surfaces in USD: a Mesh ``<body>_render`` beside the surface of the tets, which is hidden.
 
 It has texture coordinates, normals and a material of its own. Of a rigid body all of it is written
 once, in the frame of its mesh.
@@ -32,8 +32,8 @@ class Render:
 
     @property
     def path(self) -> str:
-        """Its prim."""
-        return f"{self.part.path}/render"
+        """Its prim, by the name of which Blender shows the body."""
+        return f"{self.part.surface}_render"
 
 
 def renders(parts: list[Part], sim) -> list[Render]:

@@ -42,6 +42,21 @@ def test_an_episode_begins_anew(rng):
     np.testing.assert_allclose(fallen, [0.0, 0.0, 0.5 * G * t * t], atol=1e-5)
 
 
+def test_after_a_jump_nothing_is_left_of_the_contact_before():
+    def on_a_floor(height: float) -> Simulation:
+        scene = Scene((0.0, 0.0, -G))
+        scene.add_plane((0.0, 0.0, 1.0))
+        scene.add_body(box(0.3, 2), SOFT, (0.0, 0.0, 0.15 + height), label="block")
+        return Simulation(scene)
+
+    sim, fresh = run(on_a_floor(0.0), 10), on_a_floor(0.05)
+    assert len(sim.contacts())
+    sim.set_positions(0, fresh.positions(0))
+    sim.set_velocity(0, (0.0, 0.0, 0.0))
+    # Rounding, and the weight of half a step that is of another length.
+    np.testing.assert_allclose(run(sim, 2).positions(0), run(fresh, 2).positions(0), atol=1e-6)
+
+
 def test_all_bodies_and_some_vertices_can_be_set():
     sim = run(over_a_plate(), 1)
     x = sim.positions()[::-1].copy()

@@ -83,11 +83,11 @@ def keep(of: tuple[wp.array, ...], d: Damping | None) -> None:
         wp.copy(of[1], d.before)
 
 
-def forget(d: Damping | None, vertices: slice = slice(None)) -> None:
+def forget(d: Damping | None) -> None:
     """Nothing has touched."""
     if d:
-        d.last[vertices].zero_()
-        d.before[vertices].zero_()
+        d.last.zero_()
+        d.before.zero_()
 
 
 def recall(d: Damping | None, of: tuple[wp.array, ...], verts: np.ndarray) -> None:
@@ -97,6 +97,15 @@ def recall(d: Damping | None, of: tuple[wp.array, ...], verts: np.ndarray) -> No
             mine = array.numpy().copy()
             mine[verts] = kept.numpy()[verts]
             array.assign(mine)
+
+
+def forget_at(d: Damping | None, verts: np.ndarray) -> None:
+    """Nothing has touched some vertices, a mask."""
+    if d:
+        for array in (d.last, d.before):
+            kept = array.numpy().copy()
+            kept[verts] = 0.0
+            array.assign(kept)
 
 
 def values(d: Damping | None) -> dict[str, np.ndarray]:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import warp as wp
 
+from warp_contact.data import damping
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work, everything
@@ -75,8 +76,12 @@ def change_gravity(
 def set_positions(
     model: Model, state: State, work: Work, dt: np.ndarray, x: np.ndarray, v: np.ndarray
 ) -> None:
-    """Set positions ``x`` [m] where velocities at that time are ``v`` [m/s]; all (n_vert, 3)."""
+    """Set positions ``x`` [m] where velocities at that time are ``v`` [m/s]; all (n_vert, 3).
+
+    Damping expects no more of contacts what they did to these bodies before.
+    """
     body = model.vert_body.numpy()
     moved = np.isin(body, body[(x != state.x.numpy()).any(axis=1)])
     state.x.assign(x)
+    damping.forget_at(work.damping, moved)
     set_velocities(model, state, work, dt, v[moved], np.flatnonzero(moved))

@@ -69,8 +69,9 @@ def entry(s: int, t: int, ties: Ties, x: wp.array[wp.vec3], d: Implicit) -> wp.m
     a = ties.now[s]
     b = ties.now[t]
     sum = wp.mat33d()
-    for k in range(8):
-        for l in range(8):
+    corners = int(8)  # a variable: 64 copies of what follows would take minutes to compile for CUDA
+    for k in range(corners):
+        for l in range(corners):
             w = wp.float64(a[k]) * wp.float64(b[l])  # exact: K stays positive
             if w != wp.float64(0.0):
                 sum += w * response(v[k], u[l], x, d)

@@ -88,11 +88,17 @@ def floats(b: int, d: Implicit) -> bool:
 
 
 @wp.func
+def acts(p: wp.vec3) -> bool:
+    """Whether it is not 0; the square of what acts on a body of a micrometre would be."""
+    return p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0
+
+
+@wp.func
 def is_pushed(b: int, d: Implicit) -> bool:
     """Whether a force or torque from outside acts on a lumped body, and it is awake."""
     if d.kind[b] != LUMPED or d.awake[b] == 0:
         return False
-    return wp.length_sq(d.force[b]) > 0.0 or wp.length_sq(d.torque[b]) > 0.0
+    return acts(d.force[b]) or acts(d.torque[b])
 
 
 @wp.func

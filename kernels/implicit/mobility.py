@@ -21,6 +21,7 @@ from warp_contact.kernels.implicit.bodies import (
     RIGID,
     Implicit,
     RigidMotion,
+    acts,
     as_vec3,
     as_vec3d,
     block_of,
@@ -52,7 +53,7 @@ def find_response(
     turning = wp.vec3d()
     found = bool(False)
     for i in range(d.body_vert[b], d.body_vert[b + 1]):
-        if wp.length_sq(p[i]) > 0.0:
+        if acts(p[i]):
             found = True
             q = as_vec3d(p[i])
             total += q

@@ -13,7 +13,14 @@ no contact that approaches. Momentum is that of p, at every pass.
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import Implicit, RigidMotion, deforms, floats, rigid_at
+from warp_contact.kernels.implicit.bodies import (
+    Implicit,
+    RigidMotion,
+    as_vec3d,
+    deforms,
+    floats,
+    rigid_at,
+)
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.worlds import FIRST_LOOK, Worlds
 
@@ -89,8 +96,8 @@ def find_lacking(
         s = wp.vec3(0.0, 0.0, 0.0)
         if d.inv_mass[i] > 0.0 and deforms(b, d):
             s = p[i] - ay[i]
-            given += wp.float64(wp.length_sq(p[i]))
-        left += wp.float64(wp.length_sq(s))
+            given += wp.length_sq(as_vec3d(p[i]))
+        left += wp.length_sq(as_vec3d(s))
         q[i] = s
     ratio = float(0.0)
     if left > wp.float64(0.0):

@@ -17,6 +17,7 @@ from warp_contact.kernels.implicit.bodies import (
     RIGID,
     Implicit,
     RigidMotion,
+    acts,
     as_vec3,
     as_vec3d,
     block_of,
@@ -213,7 +214,7 @@ def gather(
         for k in range(touched.n[b]):
             i = touched.vert[first + k]
             z[i] = wp.vec3(0.0, 0.0, 0.0)
-            if wp.length_sq(p[i]) > 0.0:
+            if acts(p[i]):
                 busy[b] = 1
                 pushed += as_vec3d(p[i])
                 turning += wp.cross(as_vec3d(x[i] - d.centre[b]), as_vec3d(p[i]))

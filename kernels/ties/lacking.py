@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_contact.kernels.implicit.bodies import Implicit, deforms
+from warp_contact.kernels.implicit.bodies import Implicit, as_vec3d, deforms
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -34,15 +34,15 @@ def make_up(
             for i in range(first, last):
                 lacking[i] = wp.vec3(0.0, 0.0, 0.0)
         return
-    given = float(0.0)
-    left = float(0.0)
+    given = wp.float64(0.0)
+    left = wp.float64(0.0)
     for i in range(first, last):
         if d.inv_mass[i] > 0.0:
-            given += wp.length_sq(p[i])
-            left += wp.length_sq(p[i] - ay[i])
+            given += wp.length_sq(as_vec3d(p[i]))
+            left += wp.length_sq(as_vec3d(p[i] - ay[i]))
     part = float(0.0)
     if left < given:
-        part = EASED * wp.min(2.0 - 2.0 * wp.sqrt(left / given), 1.0) / d.h[b]
+        part = EASED * wp.min(2.0 - 2.0 * wp.sqrt(wp.float32(left / given)), 1.0) / d.h[b]
     for i in range(first, last):
         if d.inv_mass[i] > 0.0:
             lacking[i] = (1.0 - EASED) * lacking[i] + part * (p[i] - ay[i])

@@ -19,6 +19,7 @@ import warp as wp
 from warp_contact.kernels.implicit.bodies import (
     Implicit,
     RigidMotion,
+    acts,
     as_vec3,
     as_vec3d,
     deforms,
@@ -201,7 +202,7 @@ def gather(
         i = tied.vert[k]
         p = tied.p[i]
         tied.z[i] = p
-        if wp.length_sq(p) > 0.0:
+        if acts(p):
             tied.busy[b] = 1
         if moves(b, d):
             pushed += as_vec3d(p)

@@ -80,6 +80,7 @@ class Inversion:
         """How much of its volume the flat tets lack to be not flat, summed over each world."""
         return np.bincount(self._of_tet, np.maximum(FLAT - ratios, 0.0), self._n)
 
+    @np.errstate(invalid="ignore")  # what is not finite is told by the vertex
     def _ratios(self, state: State) -> np.ndarray:
         """Volume of each tet over that at rest, shape (n_tet,)."""
         a, b, c, d = np.moveaxis(state.x.numpy()[self._tets], 1, 0)

@@ -28,6 +28,7 @@ def contact_fields(model: Model, x: wp.array, work: Work, duration: float) -> di
     }
 
 
+@np.errstate(invalid="ignore")
 def vertex_area(model: Model, x: wp.array) -> np.ndarray:
     """A third of the surface around each vertex [m^2], shape (n_vert,)."""
     tris, at = model.tris.numpy(), x.numpy().astype(np.float64)

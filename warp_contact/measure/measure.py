@@ -21,7 +21,7 @@ from warp_contact.step.forces import energies, internal_forces
 
 @dataclass(frozen=True)
 class Measure:
-    """One frame in numbers.
+    """One frame in numbers; of a state that is not finite they are NaN.
 
     Attributes:
         kinetic: energy [J] at the time of the positions, from the velocities of half a step h
@@ -103,6 +103,7 @@ class Meter:
         self._trees = Trees(model)
         self.tunnelling = Tunnelling(model, self.names, self._trees)
 
+    @np.errstate(invalid="ignore", over="ignore")
     def measure(
         self, state: State, v: np.ndarray, work: Work, duration: float, dt: np.ndarray
     ) -> Measure:
@@ -119,8 +120,10 @@ class Meter:
         p, rigid, gravity = self.mass[:, None] * v, self._solids.motion(x, v), model.gravity
         ratio = topology.signed_volumes(x, self._tets) / self._volume
         self.tunnelling.follow(state.x)
-        overlap, pair, unheld = self.overlap(state.x, work)
-        self_overlap, folded = self.self_overlap(state.x)
+        (overlap, pair, unheld), (self_overlap, folded) = (np.nan, None, 0), (np.nan, None)
+        if np.isfinite(x).all():
+            overlap, pair, unheld = self.overlap(state.x, work)
+            self_overlap, folded = self.self_overlap(state.x)
         return Measure(
             kinetic=self._kinetic(state, v, work, dt) + rigid.kinetic,
             elastic=float(energy.numpy().sum(dtype=np.float64)),

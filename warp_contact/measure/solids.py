@@ -61,16 +61,23 @@ class Solids:
         self._rest, self._to_centre = rest - middle[self._of_vert], centre - middle
 
     def motion(self, x: np.ndarray, v: np.ndarray) -> Motion:
-        """At positions [m] and velocities [m/s] of all vertices, shape (n_vert, 3), float64."""
+        """At positions [m] and velocities [m/s] of all vertices, shape (n_vert, 3), float64.
+
+        NaN for a body that is not finite, or so collapsed that it has no moments of inertia.
+        """
         x, v = x[self.vertices], v[self.vertices]
         middle, v_m = self._mean(x), self._mean(v)
         r = x - middle[self._of_vert]
-        u, _, vt = np.linalg.svd(self._mean(r[:, :, None] * self._rest[:, None]))
-        u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
-        turn = u @ vt
+        mixed = self._mean(r[:, :, None] * self._rest[:, None])
         second = self._mean(r[:, :, None] * r[:, None])
         moments = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+        fit = np.isfinite(mixed).all(axis=(1, 2)) & (np.linalg.det(moments) > 0.0)
+        mixed, moments = (np.where(fit[:, None, None], a, np.eye(3)) for a in (mixed, moments))
+        u, _, vt = np.linalg.svd(mixed)
+        u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
+        turn = u @ vt
         w = np.linalg.solve(moments, self._mean(np.cross(r, v))[:, :, None])
+        w[~fit] = np.nan
         arm = (turn @ self._to_centre[:, :, None])[:, :, 0]
         spin = turn @ self._inertia @ turn.swapaxes(1, 2) @ w
         w, spin = w[:, :, 0], spin[:, :, 0]

@@ -9,8 +9,10 @@ def pose_of(x: np.ndarray, rest: np.ndarray, mass: np.ndarray) -> tuple[np.ndarr
     """Translation [m] and quaternion (x, y, z, w) that take ``rest`` nearest to ``x``, both (n, 3).
 
     Nearest by the squares of distances, weighted with the ``mass`` of each vertex [kg]
-    (Kabsch 1976).
+    (Kabsch 1976). NaN where ``x`` is not finite.
     """
+    if not np.isfinite(x).all():
+        return np.full(3, np.nan), np.full(4, np.nan)
     place, turn = frame_of(x, rest, mass)
     return place, quaternion(turn)
 

@@ -10,6 +10,7 @@ import pytest
 from warp_contact import Simulation, scenes
 from warp_contact.command import cli
 from warp_contact.scenes.examples import (
+    animated,
     conveyor,
     episodes,
     friction_sweep,
@@ -21,7 +22,7 @@ from warp_contact.scenes.examples import (
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenes" / "examples"
 FILES = sorted(FOLDER.glob("[!_]*.py"))
-SCENES = [path for path in FILES if "def build(" in path.read_text(encoding="utf-8")]
+SCENES = [path for path in FILES if "-> wc.Scene:" in path.read_text(encoding="utf-8")]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -62,6 +63,26 @@ def test_the_conveyor_takes_the_parcel_along_after_it_has_slipped():
     np.testing.assert_allclose(speeds[slips], expected, atol=0.03 * conveyor.SPEED)
     assert speeds[11] == pytest.approx(conveyor.SPEED, rel=0.03)
     assert abs(speeds[-1]) < 0.03 * conveyor.SPEED  # the belt stopped 12 frames ago
+
+
+def test_the_block_goes_with_the_animated_skin_and_flies_off_with_its_speed():
+    heights = np.array(animated.main())
+    skin = animated.motion(animated.skin(), 60)[1:, :, 2].max(axis=1)
+    flies = int(np.ceil(np.arccos(animated.COSINE) / animated.W * animated.FPS))
+    # Pressed down by 27 m/s^2 it is lower by rho a EDGE / 2 E = 0.004 of its edge.
+    np.testing.assert_allclose(heights[:flies], skin[:flies], atol=4e-3 * animated.EDGE)
+    # The skin has a constant speed in a frame: the block may take off half a frame late or early.
+    assert max(heights) == pytest.approx(animated.APEX, rel=0.02)
+    assert max(heights) > skin.max() + 0.005
+
+
+def test_in_newton_soft_bodies_tell_the_force_between_them():
+    pytest.importorskip("newton", "1.8")
+    from warp_contact.scenes.examples import in_newton
+
+    force, weight = in_newton.main()
+    # The lower block is pushed up by twice the weight and down by the upper one; they still swing.
+    np.testing.assert_allclose(force, [[0.0, 0.0, weight]] * 2, atol=1e-3 * weight)
 
 
 def test_the_gripper_lifts_the_box_by_friction_alone_and_lets_it_fall():

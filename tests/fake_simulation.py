@@ -56,6 +56,7 @@ class FakeSimulation:
             gravity=self.model.gravity,
             friction=0.5,
             plane_friction=[None],
+            attachments=[],
         )
         self.fps, self.frame = fps, 0
 

@@ -55,7 +55,10 @@ LADDER = (  # of the kernel rooms: each may import those before it
 RUNG = {room: rung for rung, rooms in enumerate(LADDER) for room in rooms}
 ONLY_IN = {  # packages that the solver does without
     "pxr": {"scene/files", "scene/reading", "scene/reading_faces", "usd", "picture"}
-    | {f"scene/reading_{part}" for part in ("others", "scene", "stage", "surroundings")},
+    | {
+        f"scene/reading_{part}"
+        for part in ("attachments", "others", "scene", "stage", "surroundings")
+    },
     "PIL": {"picture/files"},
     "imageio_ffmpeg": {"picture/files"},
     "meshio": {"scene/files", "scene/reading", "scene/reading_faces"},

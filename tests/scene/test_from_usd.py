@@ -85,7 +85,7 @@ def test_what_is_not_understood_is_listed(tmp_path):
     soft.AddAppliedSchema("PhysxBaseDeformableBodyAPI")
     name = "physxDeformableBody:solverPositionIterationCount"
     soft.CreateAttribute(name, Sdf.ValueTypeNames.Int).Set(16)
-    UsdPhysics.RevoluteJoint.Define(stage, "/joint").CreateBody0Rel().SetTargets(["/World/die"])
+    UsdPhysics.DistanceJoint.Define(stage, "/joint").CreateBody0Rel().SetTargets(["/World/die"])
     UsdPhysics.CollisionAPI.Apply(UsdGeom.Cube.Define(stage, "/wall").GetPrim())
     UsdPhysics.RigidBodyAPI.Apply(UsdGeom.Sphere.Define(stage, "/marble").GetPrim())
     UsdPhysics.Scene.Define(stage, "/second")
@@ -94,7 +94,7 @@ def test_what_is_not_understood_is_listed(tmp_path):
     for line in (
         "PhysxBaseDeformableBodyAPI: /World/soft",
         f"{name} = 16: /World/soft",
-        "PhysicsRevoluteJoint: /joint",
+        "PhysicsDistanceJoint: /joint",
         "a Cube that collides, without tets: /wall",
         "a body without a TetMesh: /marble",
         "PhysicsScene /second: /scene counts",
@@ -120,7 +120,83 @@ def test_attachments_to_what_stands_still_hold_vertices(tmp_path):
         prim.CreateAttribute(f"{space}:{ids}", kinds.IntArray).Set([len(path), 1])
     scene = read(stage)
     assert np.flatnonzero(scene.bodies[1].fixed).tolist() == [1, 4, 5]
-    assert "OmniPhysicsVtxXformAttachment: /rope" in scene.not_read
+    reason = "which does not say where its vertices are held"
+    assert f"OmniPhysicsVtxXformAttachment: /rope, {reason}" in scene.not_read
+
+
+def jointed(stage) -> Usd.Stage:
+    """With an arm at the die, and joints that hold it or cannot be read."""
+    arm = UsdGeom.Xform.Define(stage, "/World/arm")
+    arm.AddTranslateOp().Set((0.0, 100.0, 40.0))
+    UsdPhysics.RigidBodyAPI.Apply(arm.GetPrim())
+    tets(stage, "/World/arm/tets").AddAppliedSchema("PhysicsCollisionAPI")
+    joints = [
+        UsdPhysics.RevoluteJoint.Define(stage, "/elbow"),
+        UsdPhysics.FixedJoint.Define(stage, "/apart"),
+        UsdPhysics.PrismaticJoint.Define(stage, "/idle"),
+        UsdPhysics.SphericalJoint.Define(stage, "/nail"),
+        UsdPhysics.FixedJoint.Define(stage, "/soft"),
+    ]
+    for joint, other in zip(joints, ("die", "die", "die", "arm", "soft"), strict=True):
+        joint.CreateBody0Rel().SetTargets([f"/World/{other}"])
+        joint.CreateBody1Rel().SetTargets(["/World/arm/tets"] if other == "die" else [])
+    elbow, apart, idle, nail, _ = joints
+    elbow.CreateAxisAttr("Z")
+    # The die is twice as large; 20 cm from it, and from the arm, is the elbow.
+    elbow.CreateLocalPos0Attr((0.0, 0.0, 10.0))
+    elbow.CreateLocalPos1Attr((0.0, 0.0, -20.0))
+    elbow.CreateBreakForceAttr(5e5)
+    elbow.CreateLowerLimitAttr(-90.0)
+    apart.CreateLocalPos1Attr((0.0, 0.0, -20.0))
+    idle.CreateJointEnabledAttr(False)
+    nail.CreateLocalPos1Attr((0.0, 100.0, 40.0))
+    return stage
+
+
+def test_joints_of_others_hold_bodies_where_they_are(tmp_path):
+    stage = jointed(foreign(tmp_path / "a.usda"))
+    scene = read(stage)
+    hinge, pin = scene.attachments
+    assert (hinge.label, hinge.kind) == ("elbow", "hinge")
+    assert (hinge.a.label, hinge.b.label) == ("arm", "die")
+    assert (pin.label, pin.kind, pin.a.label, pin.b) == ("nail", "ball", "arm", None)
+    # Centimetres with y up are metres with z up: its axis is -y here. 1 g cm/s^2 are 1e-5 N.
+    assert hinge.breaking_force == pytest.approx(5.0)
+    np.testing.assert_allclose(hinge.points.mean(axis=0), [0.0, -0.2, 1.0], atol=1e-7)
+    np.testing.assert_allclose(np.diff(hinge.points, axis=0)[0], [0.0, -0.12, 0.0], atol=1e-6)
+    np.testing.assert_allclose(pin.points, [[0.0, -0.4, 1.0]], atol=1e-7)
+    for line in (
+        "physics:lowerLimit = -90.0: /elbow",
+        "PhysicsFixedJoint: /apart, whose two frames are not in the same place",
+        "PhysicsPrismaticJoint: /idle, which is not enabled",
+        "PhysicsFixedJoint: /soft, which names a body that deforms: attachments hold such",
+    ):
+        assert line in scene.not_read
+    assert not any("/nail" in line for line in scene.not_read)
+
+
+def test_attachments_of_others_to_rigid_bodies_are_welds(tmp_path):
+    stage, ids = foreign(tmp_path / "a.usda"), [0, 1, 2, 5]
+    x = 100.0 * MESH.vertices[ids] + (50.0, 0.0, 0.0)
+    at_die = x + (0.0, -100.0, 0.0)
+    at_die = at_die @ np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) / 2.0
+    for path, places in ("/glue", at_die), ("/far", at_die + 1.0):
+        prim, kinds = stage.DefinePrim(path, "PhysicsAttachment"), Sdf.ValueTypeNames
+        prim.CreateRelationship("physics:src0").SetTargets(["/World/soft"])
+        prim.CreateRelationship("physics:src1").SetTargets(["/World/die"])
+        prim.CreateAttribute("physics:indices0", kinds.IntArray).Set(ids)
+        prim.CreateAttribute("physics:type1", kinds.Token).Set("xform")
+        prim.CreateAttribute("physics:coords1", kinds.Vector3fArray).Set(places.tolist())
+        prim.CreateAttribute("physics:stiffness", kinds.Float).Set(4e3)
+    scene = read(stage)
+    (glue,) = scene.attachments
+    assert (glue.kind, glue.a.label, glue.b.label) == ("weld", "soft", "die")
+    assert glue.stiffness == pytest.approx(16.0)  # of four points, each 4e3 g/s^2
+    np.testing.assert_array_equal(glue.verts[:, 0], ids)
+    there = -np.einsum("nk,nkc->nc", glue.weights[:, 4:], glue.b.x[glue.verts[:, 4:]])
+    np.testing.assert_allclose(there, glue.a.x[ids], atol=1e-6)  # float32 of a metre
+    line = "PhysicsAttachment: /far, whose vertices are not where they are held"
+    assert line in scene.not_read
 
 
 def test_kinematic_bodies_colliding_tets_and_planes_are_obstacles(tmp_path):

@@ -26,7 +26,7 @@ class Attachment:
         label: its name, unique among the attachments of the scene
         kind: one of ``KINDS``
         a, b: the bodies; b is None for the world
-        points: of both at the start [m], shape (n, 3)
+        points: of b, or of the world, at the start [m], shape (n, 3)
         stiffness: of all points together [N/m]; None for a hard one
         breaking_force: above which it breaks [N]; None for never
         verts, weights: of the points, those of a, then those of b, shape (n, 8)
@@ -51,22 +51,35 @@ class Attachment:
 def make(index, label, a, b, kind, at, vertices, axis, stiffness, breaking_force) -> Attachment:
     """An attachment of bodies at their places; raises ValueError for what holds nothing."""
     checks.one_of(kind, KINDS, "kind")
+    line = _axis(axis, kind)
+    _check_pair(a, b)
+    points, chosen = _points(a, b, kind, at, vertices, line)
+    first = _within(a, points) if chosen is None else _of_vertices(chosen)
+    second = None if b is None else _within(b, points)
+    sites = first, second, points
+    return hold(index, label, a, b, kind, sites, line, stiffness, breaking_force)
+
+
+def hold(index, label, a, b, kind, sites, line, stiffness, breaking_force) -> Attachment:
+    """An attachment of points that are known, at the same place or apart.
+
+    ``sites`` are vertices and weights, of shape (n, 4) each, on a and, None for the world, on b,
+    and the places of the latter [m], shape (n, 3). ``line`` is the direction of a slider or hinge.
+
+    Raises:
+        ValueError: it holds nothing, or a number is out of range
+    """
     stiffness = None if stiffness is None else checks.positive(stiffness, "stiffness")
     if breaking_force is not None:
         breaking_force = checks.positive(breaking_force, "breaking_force")
-    if b is not None and b.world != a.world:
-        raise ValueError(f"bodies of worlds {a.world} and {b.world} do not meet")
-    if b is a:
-        raise ValueError("a body cannot be attached to itself")
-    line = _axis(axis, kind)
-    points, chosen = _points(a, b, kind, at, vertices, line)
+    _check_pair(a, b)
+    first, second, points = sites
     n = len(points)
     verts, weights, along = np.zeros((n, 8), dtype=int), np.zeros((n, 8)), np.zeros((n, 8))
-    first = _within(a, points) if chosen is None else _of_vertices(chosen)
     verts[:, :4], weights[:, :4] = first
     to_world = np.zeros(3)
     if b is not None:
-        verts[:, 4:], own = _within(b, points)
+        verts[:, 4:], own = second
         weights[:, 4:] = -own
         if kind == "slider":
             along[:, 4:] = _within(b, points + line)[1] - own
@@ -75,6 +88,33 @@ def make(index, label, a, b, kind, at, vertices, axis, stiffness, breaking_force
     _refuse_fixed(a, b, verts, weights)
     given = points, stiffness, breaking_force, verts, weights, along, to_world
     return Attachment(index, label, kind, a, b, *given)
+
+
+def site_of(body: Body, given: dict, tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and weights of points that are given by ``vertices``, in ``tets``, or by place.
+
+    ``tets`` are those that the numbers mean, shape (m, 4); of each tet three ``coords``, the
+    weights of its first vertices. ``points`` [m] are those of a rigid body, shape (n, 3).
+
+    Raises:
+        ValueError: there is no such vertex or tet
+    """
+    if "vertices" in given:
+        return _of_vertices(checks.vertex_ids(given["vertices"], len(body.x), "vertices"))
+    if "points" in given:
+        return _within(body, checks.vectors(given["points"], len(given["points"]), "points", HUGE))
+    n = len(given["tets"])
+    chosen, coords = np.array(given["tets"], dtype=int), np.array(given["coords"]).reshape(-1, 3)
+    if len(coords) != n or not ((chosen >= 0) & (chosen < len(tets))).all():
+        raise ValueError(f"tets {given['tets']} with {len(coords)} coordinates: no such tets")
+    return tets[chosen], np.concatenate([coords, 1.0 - coords.sum(axis=1, keepdims=True)], axis=1)
+
+
+def _check_pair(a: Body, b: Body | None) -> None:
+    if b is not None and b.world != a.world:
+        raise ValueError(f"bodies of worlds {a.world} and {b.world} do not meet")
+    if b is a:
+        raise ValueError("a body cannot be attached to itself")
 
 
 def lay_out(attachments: Sequence[Attachment], bodies: Sequence[Body]) -> TieTable | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from warp_contact import checks
-from warp_contact.scene import files
+from warp_contact.scene import attachments, files
 from warp_contact.scene.materials import Corotated, NeoHookean, Rigid, SpringNetwork
 from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.pose import quaternion
@@ -42,6 +42,11 @@ def fill(scene, path, at, material) -> None:
             add_body(scene, info, own, material, said)
         except ValueError as error:
             raise MeshError(f"{root}: {info['path']}: {error}") from None
+    for info in found["attachments"]:
+        try:
+            add_attachment(scene, info, arrays)
+        except ValueError as error:
+            said.append(f"{info['path']}: {error}")
     for plane in found["planes"]:
         scene.add_plane(plane["normal"], plane["offset"], plane["friction"])
     scene.not_read = [*said, *found["only_seen"]]
@@ -84,6 +89,31 @@ def add_body(scene, info: dict, arrays: dict, material, said: list[str]) -> None
     if "start" in arrays:
         start = checks.numbers(arrays["start"], body.x.shape, "points", HUGE)
         scene.bodies[-1] = replace(body, start=start)
+
+
+def add_attachment(scene, info: dict, arrays: dict) -> None:
+    """Add an attachment as it was read, of bodies that are there.
+
+    Raises:
+        ValueError: it holds nothing
+    """
+    taken = {other.label for other in scene.attachments}
+    label = info["label"][: checks.LONGEST - 10]
+    free = (f"{label}_{n}" if n else label for n in range(len(taken) + 1))
+    given = {"label": next(name for name in free if name not in taken)}
+    given |= {key: info[key] for key in ("kind", "stiffness", "breaking_force")}
+    if "at" in info:
+        scene.attach(info["a"], info["b"], at=info["at"], axis=info["axis"], **given)
+        return
+    k, sites = len(scene.attachments), []
+    for which, site in (info["a"], info["first"]), (info["b"], info["second"]):
+        body = None if which is None else scene.bodies[which]
+        sites.append(body and attachments.site_of(body, site, arrays[f"{which}.tets"]))
+    a, b = (None if info[side] is None else scene.bodies[info[side]] for side in "ab")
+    points = np.array(info["second"].get("points", np.zeros((len(sites[0][0]), 3))))
+    line = np.zeros(3) if info["axis"] is None else np.array(info["axis"])
+    made = attachments.hold(k, a=a, b=b, sites=(*sites, points), line=line, **given)
+    scene.attachments.append(made)
 
 
 def label_of(scene, info: dict) -> str:

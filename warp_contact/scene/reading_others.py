@@ -1,9 +1,11 @@
 """What a USD stage holds and a scene does not: physics in words, and what is only seen."""
 
 import re
+from math import inf
 
 from pxr import UsdGeom, UsdLux
 
+from warp_contact.scene.reading_attachments import JOINTS, PINS
 from warp_contact.scene.reading_stage import Reader, note, schemas
 
 PHYSICS = re.compile(r"(?:omni)?physics|physx|newton|mjc|mujoco|drive|limit", re.IGNORECASE)
@@ -19,14 +21,16 @@ KNOWN = {  # schemas of which the attributes are read or listed one by one
     *("PhysicsVolumeDeformableMaterialAPI", "OmniPhysicsDeformableMaterialAPI"),
     *("OmniPhysicsBaseMaterialAPI", "PhysxDeformableBodyMaterialAPI"),
 }
-TYPES = {"PhysicsScene", "PhysicsAttachment"}
-TYPES |= {"PhysicsVtxXformAttachment", "OmniPhysicsVtxXformAttachment"}
+TYPES = {"PhysicsScene", *JOINTS, *PINS}
 USUAL = {  # values that ask for nothing, by the names of attributes
     "collisionEnabled": True,
     "startsAsleep": False,
     "simulationOwner": None,
     "restitution": 0.0,
     "approximation": "none",
+    **{"lowerLimit": -inf, "upperLimit": inf, "breakTorque": inf},
+    **{"coneAngle0Limit": -1.0, "coneAngle1Limit": -1.0, "excludeFromArticulation": False},
+    "damping": 0.0,
 }
 BODIES = {"PhysicsRigidBodyAPI", "PhysicsDeformableBodyAPI", "OmniPhysicsDeformableBodyAPI"}
 BODIES |= {"PhysxDeformableBodyAPI"}

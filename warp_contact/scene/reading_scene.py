@@ -10,6 +10,7 @@ import json
 import numpy as np
 from pxr import Gf, Usd, UsdGeom
 
+from warp_contact.scene.reading_attachments import held
 from warp_contact.scene.reading_others import list_others
 from warp_contact.scene.reading_stage import (
     COLLIDER,
@@ -26,7 +27,6 @@ from warp_contact.scene.reading_surroundings import friction_of, half_spaces, su
 
 SOFT = {"PhysicsDeformableBodyAPI", "OmniPhysicsDeformableBodyAPI", "PhysxDeformableBodyAPI"}
 SIM = {"PhysicsVolumeDeformableSimAPI", "OmniPhysicsVolumeDeformableSimAPI"}
-PINS = {"PhysicsAttachment", "PhysicsVtxXformAttachment", "OmniPhysicsVtxXformAttachment"}
 RIGID = "PhysicsRigidBodyAPI"
 NOTES = ("model", "damping", "distance", "area", "volume")  # of a material, by a UsdWriter
 LAST = 1 << 30  # behind all bodies that a UsdWriter has numbered
@@ -45,10 +45,9 @@ def read(stage: Usd.Stage, at: str) -> dict[str, np.ndarray]:
         info, own = kind(reader, owner, tets)
         bodies.append(info)
         arrays |= {f"{k}.{name}": value for name, value in own.items() if value is not None}
-    for prim in reader.prims:
-        if str(prim.GetTypeName()) in PINS:
-            pin(reader, prim, bodies, arrays)
-    scene = {"bodies": bodies, "planes": half_spaces(reader)} | surroundings(reader)
+    found = held(reader, bodies, arrays, lambda path: is_body(reader, path))
+    scene = {"attachments": found}
+    scene |= {"bodies": bodies, "planes": half_spaces(reader)} | surroundings(reader)
     bare = [b["path"] for b in [*bodies, *scene["planes"]] if b["friction"] is None]
     if bare and scene["friction"] is None:
         reader.said.append(f"no friction of {named(bare)}: that of the scene")
@@ -230,24 +229,6 @@ def ids_of(reader: Reader, prim) -> np.ndarray:
 def ids(value) -> np.ndarray | None:
     """Numbers of vertices, None for none."""
     return np.array(value, dtype=np.int64) if value else None
-
-
-def pin(reader: Reader, prim, bodies: list, arrays: dict) -> None:
-    """Vertices of a deformable body that an attachment holds where nothing moves."""
-    first, second = (reader.targets(prim, name) for name in ("src0", "src1"))
-    chosen = ids(reader.physics(prim, "indices0") or reader.physics(prim, "vtxIndicesSrc0"))
-    by_vertex = reader.physics(prim, "type0", "point") in ("point", "vertex")
-    to = [reader.stage.GetPrimAtPath(path) for path in second]
-    moving = [p for p in to for q in p.GetPath().GetPrefixes() if is_body(reader, q)]
-    owners = [k for k, b in enumerate(bodies) if {*map(str, first)} & {b["path"], *b["tets"]}]
-    enabled = reader.physics(prim, "attachmentEnabled", True)
-    if not owners or moving or chosen is None or not by_vertex or not enabled:
-        reader.said.append(f"{prim.GetTypeName()}: {prim.GetPath()}")
-        return
-    for name in ("type1", "indices1", "coords1", "localPositionsSrc1"):  # where the vertices are
-        reader.attribute(prim, name)
-    key = f"{owners[0]}.held"
-    arrays[key] = np.unique(np.concatenate([arrays.get(key, chosen), chosen]))
 
 
 def is_body(reader: Reader, path) -> bool:

@@ -129,7 +129,8 @@ def note(prim, name: str, usual=None):
 def tidy(value):
     """A value in Python's types; of a float32 the shortest number that rounds to it."""
     if isinstance(value, float):
-        return float(str(np.float32(value))) if np.float32(value) == value else value
+        single = np.float32(value)  # compared as a float: NumPy would round the other one
+        return float(str(single)) if float(single) == value else value
     if isinstance(value, str | bool | int):
         return value
     return [tidy(number) for number in np.array(value, dtype=float).tolist()]

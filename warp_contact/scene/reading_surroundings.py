@@ -30,7 +30,7 @@ def half_spaces(reader: Reader) -> list[dict]:
             normal /= np.linalg.norm(normal)
             friction = friction_of(reader, material_of(prim))
             info = {"path": str(prim.GetPath()), "normal": normal.tolist(), "friction": friction}
-            found.append(info | {"offset": tidy(float(normal @ point))})
+            found.append(info | {"offset": tidy(float(np.float32(normal @ point)))})
     return found
 
 

@@ -77,4 +77,4 @@ def numbers(value) -> np.ndarray:
     """The numbers of a value as it is written."""
     if isinstance(value, Gf.Quatd):
         return np.array([value.GetReal(), *value.GetImaginary()])
-    return np.asarray(value)
+    return np.atleast_1d(value)

@@ -15,7 +15,7 @@ SHADES = 128  # colours of a body, from none to full pressure: their differences
 ROOM = 4.0  # half the width of a drawn half-space, in scene diagonals
 FOV = 28.0  # vertical angle of view [degrees]
 # Names of prims that are no body.
-TAKEN = ("Looks", "view", "physics", "render", "sim", "contacts", "forces")
+TAKEN = ("Looks", "view", "physics", "render", "sim", "contacts", "forces", "attachments")
 FLAGS = ("velocities", "tets", "flatten", "animate_tets", "resume")  # of a UsdWriter
 
 

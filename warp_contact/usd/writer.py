@@ -23,6 +23,7 @@ import numpy as np
 from pxr import Sdf, Tf, UsdGeom, Vt
 
 from warp_contact.files import replacing
+from warp_contact.usd.attachments import Attachments
 from warp_contact.usd.contacts import ContactArrows
 from warp_contact.usd.fields import field_types, field_values, hydrostatic
 from warp_contact.usd.folder import TOPOLOGY, RunFolder, frame_file, frame_files
@@ -70,7 +71,7 @@ class UsdWriter:
                 or a ``RunFolder``, which is closed with the writer
             sim: the simulation; its model, positions and contact fields are what is written
             velocities: write velocities too [m/s], those of surfaces, and of tets that are animated
-            tets: write each body's TetMesh, purpose guide
+            tets: write each body's TetMesh, purpose guide, and the attachments
             flatten: ``close()`` also writes everything into one ``<name>.usdc``
             animate_tets: time-sample the points of the TetMeshes, inner vertices included
             contacts: write points and arrows of contact forces; a number is their length [m/N]
@@ -90,16 +91,18 @@ class UsdWriter:
         self.sim, self.velocities, self.flatten = sim, velocities, flatten
         self.animate_tets = animate_tets and tets
         self.parts, self.start, self.end, self.notes = parts(sim.model), None, None, []
-        self.renders = renders(self.parts, sim)
+        self.attachments = Attachments(self.parts, sim.scene.attachments if tets else ())
         self.scale = hydrostatic(sim) if pressure_scale is None else pressure_scale
         self._begin(topology(self.parts, sim, tets, view), resume)
 
     def _begin(self, prims: Sdf.Layer, resume: bool) -> None:
         """Write what does not change."""
         try:
+            self.renders = renders(self.parts, self.sim)
             self.grows, self.layer = self.scale == 0.0, self._declare()
             if self.arrows:
                 self.arrows.define(prims)
+            self.attachments.define(prims)
             if resume:
                 self._check()
             copy_textures(self.renders, self.folder.now)
@@ -198,6 +201,7 @@ class UsdWriter:
                 yield f"{part.path}/sim.extent", UsdGeom.PointBased.ComputeExtent(points)
         for render in self.renders:
             yield from render_values(render, self.sim)
+        yield from self.attachments.values(self.sim)
         if self.arrows:
             yield from self.arrows.values(self.sim)
 
@@ -216,6 +220,7 @@ class UsdWriter:
             declare(layer, attributes)
         for render in self.renders:
             declare(layer, render_types(render))
+        declare(layer, self.attachments.types())
         if self.arrows:
             declare(layer, self.arrows.types())
         return layer

@@ -69,7 +69,7 @@ class Stage:
         made = {"kind": kind, "stiffness": note(self.prim, "stiffness"), "breaking_force": force}
         if force is not None and not force < ENDLESS:
             made["breaking_force"] = None
-        if self.is_own:
+        if self.is_own and None not in (note(self.prim, f"points{k}") for k in (0, 1)):
             return made | self._own(ends)
         if ends[1][0] is None:
             ends.reverse(), frames.reverse()

@@ -72,7 +72,7 @@ class Stage:
         if self.is_own and None not in (note(self.prim, f"points{k}") for k in (0, 1)):
             return made | self._own(ends)
         if ends[1][0] is None:
-            ends.reverse(), frames.reverse()
+            ends, frames = ends[::-1], frames[::-1]
         (b, _), (a, _) = ends
         if a is None:
             raise Unheld("which holds no body")

@@ -46,7 +46,7 @@ def read(stage: Usd.Stage, at: str) -> dict[str, np.ndarray]:
         bodies.append(info)
         arrays |= {f"{k}.{name}": value for name, value in own.items() if value is not None}
     found = held(reader, bodies, arrays, lambda path: is_body(reader, path))
-    scene = {"attachments": found}
+    scene: dict = {"attachments": found}
     scene |= {"bodies": bodies, "planes": half_spaces(reader)} | surroundings(reader)
     bare = [b["path"] for b in [*bodies, *scene["planes"]] if b["friction"] is None]
     if bare and scene["friction"] is None:

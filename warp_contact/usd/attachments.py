@@ -7,6 +7,7 @@ What has no name there is a constant under ``userProperties``.
 """
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, Vt
@@ -28,8 +29,8 @@ class Attachments:
 
     def __init__(self, parts: list[Part], attachments):
         """Name the prims."""
-        self.parts, taken = parts, set()
-        self.flags: dict[str, object] = {}
+        self.parts, self.flags = parts, dict[str, Any]()
+        taken: set[str] = set()
         for attachment in attachments:
             path = f"{SCOPE}/{prim_name(attachment.label, taken)}"
             name = "jointEnabled" if self._is_joint(attachment) else "attachmentEnabled"

@@ -1,6 +1,10 @@
 """Attachments in USD: joints and attachments that others know, read back with the same bits."""
 
+import re
+import shutil
+
 import numpy as np
+import pytest
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
 import warp_contact as wc
@@ -139,3 +143,38 @@ def test_what_broke_stays_broken_and_the_rest_goes_on_from_the_last_frame(tmp_pa
     assert len(wc.Scene.from_usd(tmp_path / "run").attachments) == 8
     early = wc.Scene.from_usd(tmp_path / "run", at=8)
     assert "pin" in [attachment.label for attachment in early.attachments]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run of one frame, on the device that Warp prefers."""
+    place = tmp_path_factory.mktemp("attachments") / "run"
+    written(place, own_scene(), 1)
+    return place
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "value", "reason"),
+    [
+        ("pin", "physics:coords0", [(np.nan, 0, 0)], "coords .*: give finite numbers"),
+        ("pin", "physics:indices0", [40], "tets \\[40\\]: body 'pad' has 40"),
+        ("glue", "physics:indices0", [*range(8), 27], "it names vertex 27"),
+        ("glue", "physics:coords1", [(0, 0, 0)] * 8, "does not say where its vertices are held"),
+        ("ceiling", "physics:coords1", [(0, np.inf, 0)] * 9, "points .*: give finite numbers"),
+        ("rail", "userProperties:axis", (np.nan, 0, 0), "axis .*: give finite numbers"),
+        ("elbow", "userProperties:points1", [(1e30, 0, 0)] * 2, "points .*: give .* numbers"),
+        ("saddle", "userProperties:stiffness", -1.0, "stiffness -1.0: give a number above 0"),
+    ],
+)
+def test_what_is_damaged_of_an_attachment_is_listed_and_the_rest_is_read(
+    path, name, value, reason, run, tmp_path
+):
+    shutil.copytree(run, tmp_path / "run")
+    stage = Usd.Stage.Open(str(tmp_path / "run" / "topology.usdc"))
+    stage.GetPrimAtPath(f"/World/attachments/{path}").GetAttribute(name).Set(value)
+    stage.Save()
+    with pytest.warns(UserWarning, match="not read or assumed"):
+        scene = wc.Scene.from_usd(tmp_path / "run")
+    (line,) = scene.not_read
+    assert f"/World/attachments/{path}" in line and re.search(reason, line)
+    assert len(scene.attachments) == 7

@@ -104,9 +104,9 @@ def site_of(body: Body, given: dict, tets: np.ndarray) -> tuple[np.ndarray, np.n
     if "points" in given:
         return _within(body, checks.vectors(given["points"], len(given["points"]), "points", HUGE))
     n = len(given["tets"])
-    chosen, coords = np.array(given["tets"], dtype=int), np.array(given["coords"]).reshape(-1, 3)
-    if len(coords) != n or not ((chosen >= 0) & (chosen < len(tets))).all():
-        raise ValueError(f"tets {given['tets']} with {len(coords)} coordinates: no such tets")
+    chosen, coords = np.array(given["tets"]), checks.numbers(given["coords"], (n, 3), "coords")
+    if not ((chosen >= 0) & (chosen < len(tets))).all():
+        raise ValueError(f"tets {given['tets']}: body '{body.label}' has {len(tets)}")
     return tets[chosen], np.concatenate([coords, 1.0 - coords.sum(axis=1, keepdims=True)], axis=1)
 
 

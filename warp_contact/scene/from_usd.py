@@ -110,8 +110,9 @@ def add_attachment(scene, info: dict, arrays: dict) -> None:
         body = None if which is None else scene.bodies[which]
         sites.append(body and attachments.site_of(body, site, arrays[f"{which}.tets"]))
     a, b = (None if info[side] is None else scene.bodies[info[side]] for side in "ab")
-    points = np.array(info["second"].get("points", np.zeros((len(sites[0][0]), 3))))
-    line = np.zeros(3) if info["axis"] is None else np.array(info["axis"])
+    n = len(sites[0][0])
+    points = checks.numbers(info["second"].get("points", np.zeros((n, 3))), (n, 3), "points", HUGE)
+    line = np.zeros(3) if info["axis"] is None else checks.numbers(info["axis"], (3,), "axis")
     made = attachments.hold(k, a=a, b=b, sites=(*sites, points), line=line, **given)
     scene.attachments.append(made)
 

@@ -34,6 +34,8 @@ def held(reader: Reader, bodies: list[dict], arrays: dict, moving) -> list[dict]
         stage = Stage(reader, prim, bodies, arrays, moving)
         try:
             made = stage.joint(JOINTS[kind]) if kind in JOINTS else stage.attachment()
+            if made and made["a"] is None:
+                raise Unheld("which holds no body")
         except Unheld as reason:
             reader.said.append(f"{kind}: {prim.GetPath()}, {reason}")
             made = None

@@ -81,7 +81,7 @@ def test_a_ball_in_an_open_bowl_comes_to_rest_at_its_bottom(kind):
 
 
 @pytest.mark.parametrize("integrator", ["explicit", "implicit"])
-def test_nothing_passes_a_thin_shell_and_the_steps_follow_its_thickness(integrator):
+def test_nothing_passes_a_thin_shell_and_explicit_steps_follow_its_thickness(integrator):
     steps = []
     for thickness in (4e-3, 1e-3):
         scene = wc.Scene()
@@ -91,9 +91,11 @@ def test_nothing_passes_a_thin_shell_and_the_steps_follow_its_thickness(integrat
         sim = wc.Simulation(scene, integrator=integrator)
         steps.append(max(sim.substeps for _ in sim.frames(12)))
         assert sim.measure().tunnelled == 0 and sim.positions(ball)[:, 2].min() > 0.0
-    # A quarter of the thickness in a step, half of it in implicit ones.
-    assert steps[0] > 3.0 / 60 / 4e-3 * (4 if integrator == "explicit" else 2) * 0.9
-    assert 3.0 <= steps[1] / steps[0] <= 5.0
+    if integrator == "implicit":  # the ball is thick, and what went through is found
+        assert steps[0] == steps[1] <= 8
+    else:  # a quarter of the thickness in a step
+        assert steps[0] > 3.0 / 60 / 4e-3 * 4 * 0.9
+        assert 3.0 <= steps[1] / steps[0] <= 5.0
 
 
 def hollow(density: float = 700.0) -> tuple[wc.TetMesh, wc.Rigid, wc.TetMesh]:

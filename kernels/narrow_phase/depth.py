@@ -22,9 +22,16 @@ import warp as wp
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.beside import Beside, list_beside
 from warp_contact.kernels.narrow_phase.opposing import looks_against
-from warp_contact.kernels.narrow_phase.shallow import ABOVE, BELOW, place_of, shallow_depth
+from warp_contact.kernels.narrow_phase.shallow import place_of, shallow_depth
 from warp_contact.kernels.narrow_phase.surface_query import corner_normals, first_hit, hit_point
-from warp_contact.kernels.narrow_phase.vertices import Penetration, is_inside_of, penetrations_of
+from warp_contact.kernels.narrow_phase.vertices import (
+    ABOVE,
+    BELOW,
+    BEYOND,
+    Penetration,
+    is_inside_of,
+    penetrations_of,
+)
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
@@ -95,7 +102,7 @@ def border_depth(
     n_inside = wp.min(inside_at[inside_at.shape[0] - 1], penetration.shape[0])
     for e in range(wp.tid(), n_inside, threads):
         found = penetration[e]
-        if found.body >= mesh.n_body:
+        if found.body >= mesh.n_body or found.side == BEYOND:
             continue
         reach = shallow * mesh.body_edge[found.body]
         root = wp.bvh_get_group_root(mesh.bvh, found.body)
@@ -142,7 +149,7 @@ def propagate(
     capacity = penetration.shape[0]
     n_inside = wp.min(inside_at[inside_at.shape[0] - 1], capacity)
     for e in range(wp.tid(), n_inside, threads):
-        if penetration[e].layer >= 0:
+        if penetration[e].layer >= 0 or penetration[e].side == BEYOND:
             continue
         i = penetration[e].vert
         weight = float(0.0)

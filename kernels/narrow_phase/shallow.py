@@ -33,18 +33,18 @@ from warp_contact.kernels.narrow_phase.surface_query import (
     hit_point,
     leaves_earlier,
 )
-from warp_contact.kernels.narrow_phase.vertices import Penetration, is_inside_of
+from warp_contact.kernels.narrow_phase.vertices import (
+    ABOVE,
+    BELOW,
+    Penetration,
+    is_inside_of,
+)
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
 SAME = wp.constant(0.02)  # weight of edges that may lead out elsewhere
 STRAIGHT = wp.constant(0.99)  # cosine: a closest point further aside is at a rim
-
-# Where a vertex lies.
-UNSURE = wp.constant(0)
-ABOVE = wp.constant(1)
-BELOW = wp.constant(2)
 
 
 @wp.struct

@@ -23,7 +23,6 @@ from warp_contact.kernels.lengths import FLUSH, NEAR_WALL, STALE_OVERLAP, VERTEX
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.opposing import along, closest_opposing, looks
-from warp_contact.kernels.narrow_phase.shallow import ABOVE, BELOW
 from warp_contact.kernels.narrow_phase.surface_query import (
     Hit,
     closest_hit,
@@ -32,7 +31,7 @@ from warp_contact.kernels.narrow_phase.surface_query import (
     inner_side,
     leaving_hit,
 )
-from warp_contact.kernels.narrow_phase.vertices import Penetration
+from warp_contact.kernels.narrow_phase.vertices import ABOVE, BELOW, BEYOND, Penetration, entry_of
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.worlds import Worlds
 
@@ -144,6 +143,7 @@ def entry_contact(
     x: wp.array[wp.vec3],
     i: int,
     edge: float,  # [m]
+    beyond: bool,
 ) -> VertexContact:
     """The contact of vertex i with the triangle by which it came in since the step began.
 
@@ -151,14 +151,11 @@ def entry_contact(
     """
     out = VertexContact()
     near = closest_hit(surface, root, tris, x, x[i], 0.1 * edge)
-    if inner_side(near, tris, x, x[i]) <= 0.0:
+    if not beyond and inner_side(near, tris, x, x[i]) <= 0.0:
         return out
-    back = x0[i] - hit_point(near, tris, x0) - (x[i] - hit_point(near, tris, x))
-    if wp.length_sq(back) == 0.0:
-        return out
-    ray = leaving_hit(surface, root, tris, x, x[i], wp.normalize(back))
-    if ray.tri >= 0 and ray.t <= ASTRAY * wp.length(back):
-        out = contact_at(ray, i, face_normal(tris[ray.tri], x), tris, x0)
+    entry = entry_of(near, surface, root, tris, x0, x, i)
+    if entry.hit.tri >= 0 and entry.hit.t <= ASTRAY * entry.back:
+        out = contact_at(entry.hit, i, face_normal(tris[entry.hit.tri], x), tris, x0)
     return out
 
 
@@ -175,6 +172,8 @@ def found_contact(
     edge = mesh.body_edge[e.body]
     stale = -STALE_OVERLAP * edge
     root = wp.bvh_get_group_root(mesh.bvh, e.body)
+    if e.side == BEYOND:
+        return entry_contact(mesh.bvh, root, mesh.tris, x0, x, i, edge, True)
     out = inner_contact(mesh.bvh, root, mesh.tris, x0, x, e, edge)
     if not out.found or (apart and out.start < stale):
         near = closest_contact(
@@ -183,7 +182,7 @@ def found_contact(
         if near.found and not (out.found and out.start >= near.start):
             out = near
     if out.found and apart and out.start < stale:
-        entry = entry_contact(mesh.bvh, root, mesh.tris, x0, x, i, edge)
+        entry = entry_contact(mesh.bvh, root, mesh.tris, x0, x, i, edge, False)
         if entry.found and entry.start >= stale:
             out = entry
     return out

@@ -1,5 +1,8 @@
 """Stage 3, narrow phase: the penetrations of a step, vertices inside a body or below a plane.
 
+A vertex that went through a body within the step, in by one side and out by another, counts too: by
+a swept test, where the motion in the step is long against the thickness of the body.
+
 A vertex outside but within the speculative margin of a body, VERTEX_MARGIN of an edge, counts too.
 Otherwise rounding would decide whether a rim that lies flush in a wall is inside, and a resting
 contact would be lost and found again and again.
@@ -12,12 +15,22 @@ import warp as wp
 from warp_contact.kernels.broad_phase.pairs import PairList
 from warp_contact.kernels.broad_phase.skins import CAREFUL
 from warp_contact.kernels.geometry import NONE, tet_weights, triangle_closest
-from warp_contact.kernels.lengths import VERTEX_MARGIN
+from warp_contact.kernels.lengths import STALE_OVERLAP, VERTEX_MARGIN
 from warp_contact.kernels.mesh import Mesh
-from warp_contact.kernels.narrow_phase.surface_query import Hit
+from warp_contact.kernels.narrow_phase.surface_query import (
+    Hit,
+    closest_hit,
+    face_normal,
+    hit_point,
+    leaving_hit,
+)
 from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
+
+INSIDE = wp.constant(-1.0)  # in place of a distance until a vertex may penetrate
+THROUGH = wp.constant(-2.0)  # the same, of one that went through the body
+SWEPT = wp.constant(0.5)  # of the thickness of a body: a longer motion in a step may go through it
 
 
 @wp.func
@@ -76,8 +89,63 @@ def clearance(
 
 
 @wp.struct
+class Entry:
+    """Where a vertex came into a body within a step."""
+
+    hit: Hit  # the triangle, and the distance back to it [m]
+    back: float  # way of the vertex against the body [m]
+    start: float  # gap to the triangle when the step began [m]
+
+
+@wp.func
+def entry_of(
+    near: Hit,  # the closest point of the body
+    surface: wp.uint64,
+    root: int,
+    tris: wp.array[wp.vec3i],
+    x0: wp.array[wp.vec3],
+    x: wp.array[wp.vec3],
+    i: int,
+) -> Entry:
+    """The triangle by which vertex i came in on a straight way against the closest point."""
+    out = Entry()
+    out.hit.tri = -1
+    back = x0[i] - hit_point(near, tris, x0) - (x[i] - hit_point(near, tris, x))
+    out.back = wp.length(back)
+    if out.back > 0.0:
+        out.hit = leaving_hit(surface, root, tris, x, x[i], back / out.back)
+        if out.hit.tri >= 0:
+            n = face_normal(tris[out.hit.tri], x)
+            out.start = wp.dot(x0[i] - hit_point(out.hit, tris, x0), n)
+    return out
+
+
+@wp.func
+def went_through(
+    i: int, body: int, clear: float, mesh: Mesh, x0: wp.array[wp.vec3], x: wp.array[wp.vec3]
+) -> bool:
+    """Whether a vertex that is outside a body, this far from it, went through it in the step."""
+    root = wp.bvh_get_group_root(mesh.bvh, body)
+    edge = mesh.body_edge[body]
+    near = closest_hit(mesh.bvh, root, mesh.tris, x, x[i], clear + 0.1 * edge)
+    if near.tri < 0:
+        return False
+    entry = entry_of(near, mesh.bvh, root, mesh.tris, x0, x, i)
+    if entry.hit.tri < 0 or entry.hit.t > entry.back:
+        return False
+    return entry.start >= -STALE_OVERLAP * edge
+
+
+# Where a vertex lies against the triangles of the body next to it.
+UNSURE = wp.constant(0)
+ABOVE = wp.constant(1)
+BELOW = wp.constant(2)
+BEYOND = wp.constant(3)  # it went through the body
+
+
+@wp.struct
 class Penetration:
-    """A vertex inside a body; depth.py finds its depth."""
+    """A vertex inside a body, or one that went through it; depth.py finds its depth."""
 
     vert: int
     body: int  # n_body + p for plane p
@@ -85,7 +153,7 @@ class Penetration:
     layer: int  # of the propagation, -1: no depth yet
     depth: float  # [m]
     direction: wp.vec3  # out of the body
-    side: int  # of the triangles next to it: UNSURE, ABOVE or BELOW of shallow.py
+    side: int  # of the triangles next to it: UNSURE, ABOVE or BELOW of shallow.py; or BEYOND
     hit: Hit  # BELOW where its direction leaves the body, ABOVE the closest point that it opposes
 
 
@@ -96,6 +164,8 @@ def find_penetrations(
     mesh: Mesh,
     pairs: PairList,  # vertices and bodies
     travelled: wp.array[float],  # (n_body + n_plane,) [m]
+    thickness: wp.array[float],  # (n_body,) [m]
+    x0: wp.array[wp.vec3],  # (n_vert,) start of the step [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
     clear_until: wp.array[float],  # (capacity,) [m] travelled by both, before any penetration
@@ -112,7 +182,7 @@ def find_penetrations(
         spent = travelled[mesh.vert_body[i]] + travelled[body]
         if spent < clear_until[c]:
             continue
-        clear_until[c] = -1.0
+        clear_until[c] = INSIDE
         clear = float(0.0)
         inside = bool(False)
         if body >= mesh.n_body:
@@ -123,6 +193,12 @@ def find_penetrations(
             margin = VERTEX_MARGIN * mesh.body_edge[body]
             clear = clearance(x[i], margin, pairs.items[c], pairs.item, mesh.tets, x)
             inside = clear <= 0.0
+            t = mesh.tets[pairs.item[pairs.items[c][0]]]
+            way = wp.length(x[i] - x0[i] - (x[t[0]] - x0[t[0]]))
+            if clear > 0.0 and way > wp.max(SWEPT * thickness[body], clear):
+                if went_through(i, body, clear, mesh, x0, x):
+                    inside = True
+                    clear_until[c] = THROUGH
         if inside:
             is_inside[c] = 1
         else:
@@ -136,6 +212,7 @@ def list_penetrations(
     n_body: int,
     pairs: PairList,  # vertices and bodies
     inside_at: wp.array[int],  # (capacity + 1,) penetrations before each pair
+    clear_until: wp.array[float],  # (capacity,) THROUGH where a vertex went through
     # out
     penetration: wp.array[Penetration],  # (contacts,)
     layer: wp.array[int],  # (1,) 0
@@ -155,6 +232,8 @@ def list_penetrations(
         found.pair = c
         found.layer = wp.where(found.body >= n_body, 0, -1)
         found.hit.tri = -1
+        if clear_until[c] == THROUGH:
+            found.side = BEYOND
         penetration[e] = found
 
 

@@ -81,6 +81,8 @@ class ImplicitWork:
         ahead: extrapolated pushes of the closure [kg m], shape (contacts,)
         by, of, rest: rigid motions by impulses, of velocities, and at rest
         busy: 1 where a body has anything to answer, shape (n_body,)
+        kept: motion of each body before the closure
+        spin: its angular momentum then, about its centre [kg m^2/s], shape (n_body,)
         drift: how bodies turn in a step
         iteration: where the iterations are
         running: bodies that still iterate, shape (1,)
@@ -119,6 +121,8 @@ class ImplicitWork:
     of: RigidMotion
     rest: RigidMotion
     busy: wp.array[int]
+    kept: RigidMotion
+    spin: wp.array[wp.vec3d]
     drift: Drift
     iteration: Iteration
     running: wp.array[int]
@@ -153,6 +157,8 @@ def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> Impl
         of=_rigid(model.n_body),
         rest=_rigid(model.n_body),
         busy=wp.zeros(model.n_body, dtype=int),
+        kept=_rigid(model.n_body),
+        spin=wp.zeros(model.n_body, dtype=wp.vec3d),
         drift=_drift(model.n_body, any(model.solids)),
         iteration=_iteration(model.n_body),
         running=wp.zeros(1, dtype=int),

@@ -14,12 +14,12 @@ damping within ``damping.reach_for``. A frame that fails is repeated at the rate
 Implicit steps are stable whatever omega: it is 0 unless a frame failed, or that of a penalty, whose
 forces are explicit. They take
 
-    n       = 2^k or 3 2^k >= max(stable, u_b / (STRIDE t_b), RESOLVED) / fps
+    n       = 2^k or 3 2^k >= max(stable, u_b / (STRIDE r_b), RESOLVED) / fps
 
 so that few lengths of steps are in use, each with inverses of its own. u_b is the largest speed of
-anything against body b, t_b its thickness. Where some bodies take explicit steps beside them,
-omega, t and e are theirs, passing and gentle count too, and n is no smaller than in the last frame
-unless KEEP of the smaller number would do.
+anything against body b, r_b its thickness, or more where it does not deform (reach.py). Where some
+bodies take explicit steps beside them, omega, t and e are theirs, passing and gentle count too, and
+n is no smaller than in the last frame unless KEEP of the smaller number would do.
 """
 
 import numpy as np
@@ -73,7 +73,7 @@ def implicit_steps(explicit, crossing, fps: float, rate: float = RESOLVED, last=
 
     Args:
         explicit: steps [1/s] that explicit bodies, a penalty and a frame that failed need, else 0
-        crossing: largest speed against a body, over its thickness [1/s]
+        crossing: largest speed against a body, over its reach [1/s]
         fps: frames a second
         rate: steps [1/s] at least
         last: steps of the last frame where bodies take explicit ones, else 0

@@ -10,6 +10,7 @@ from warp_contact.frame import step_bounds
 from warp_contact.frame.diagnosis import flattest_tet
 from warp_contact.frame.implicit_shapes import largest_mobilities
 from warp_contact.frame.last_frame import LastFrame
+from warp_contact.frame.reach import reaches
 from warp_contact.frame.worlds import Worlds
 from warp_contact.frame.wrench import Wrench
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
@@ -47,10 +48,12 @@ class StepCount:
         self._rate = step_bounds.ONE_PASS if one_pass else step_bounds.RESOLVED
         self._leaves = not isinstance(response, ContactSurface) or response.search == "literal"
         self._worlds = worlds
-        self._thickness = -worlds.most(-model.body_thickness.numpy().astype(np.float64))
         explicit = shapes.lumped if shapes else np.ones(model.n_body, dtype=bool)
         sizes = np.stack([model.body_thickness.numpy(), model.body_edge.numpy()])
         self._sizes = -worlds.most(np.where(explicit, -sizes.astype(np.float64), -np.inf))
+        self._reach = model.body_thickness.numpy().astype(np.float64)
+        if shapes:
+            self._reach = reaches(model, worlds, shapes.kind)
         self._implicit, self._mixed = shapes is not None, worlds.most(explicit.astype(int)) > 0
         lightest = np.zeros(worlds.n)
         np.maximum.at(lightest, worlds.of_vert, largest_mobilities(model))
@@ -134,7 +137,7 @@ class StepCount:
         speed = self._speed(state) if frame == 1 else np.zeros(self._worlds.n)
         dt = 1.0 / (self.fps * self.wanted)
         for w, fastest in enumerate(self._with_response(omega)):
-            wrong = step_bounds.fault(dt, fastest, speed[w], self._thickness[w])
+            wrong = step_bounds.fault(dt, fastest, speed[w], -self._worlds.most(-self._reach)[w])
             if wrong:
                 few = f"substeps={self.wanted} is too few"
                 raise SimulationError(f"frame {frame}: {few}: {wrong}")
@@ -147,7 +150,7 @@ class StepCount:
         return omega
 
     def _crossing(self, state: State) -> np.ndarray:
-        """Largest speed against a body over its thickness [1/s], in each world, (n_world,)."""
+        """Largest speed against a body over its reach [1/s], in each world, (n_world,)."""
         v, of_body = state.v.numpy().astype(np.float64), self._model.vert_body.numpy()
         count = np.maximum(np.bincount(of_body), 1)
         mean = np.stack([np.bincount(of_body, u) / count for u in v.T], axis=1)
@@ -159,7 +162,7 @@ class StepCount:
         gained = float(np.linalg.norm(self._model.gravity)) + self.wrench.accelerations()
         own = self._worlds.most(gained)[self._worlds.of_body] / self.fps
         speed = np.minimum(box, ball) + spread + own
-        return self._worlds.most(speed / self._model.body_thickness.numpy())
+        return self._worlds.most(speed / self._reach)
 
     def _extremes(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Largest and least velocities and largest speed in the world of each body."""

@@ -7,12 +7,15 @@ import warp as wp
 from warp_contact.data.implicit import ImplicitWork
 from warp_contact.data.launch import launch_over
 from warp_contact.data.model import Model
+from warp_contact.data.state import State
+from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.implicit import mobility
 from warp_contact.kernels.impulse import coupled as kernels
 from warp_contact.kernels.impulse import rows, touched
 from warp_contact.kernels.impulse.impulse import Limits
 from warp_contact.kernels.surface import coupled_closure as closure
+from warp_contact.kernels.surface import coupled_spin as spin
 from warp_contact.step import sweeps, ties
 from warp_contact.step.implicit import place
 
@@ -62,9 +65,12 @@ def sweep_all(model: Model, v: wp.array, work: Work, look: int, extrapolation: f
         ties.settle(model, v, work, keeps=True)
 
 
-def close(model: Model, x: wp.array, work: Work, look: int) -> None:
-    """Move ``x`` until no contact overlaps."""
+def close(model: Model, state: State, work: Work, look: int) -> None:
+    """Move ``state.x`` until no contact overlaps; ``state.v`` keeps the angular momentum."""
+    x = state.x
     place(model, x, work.implicit)  # bodies turn about where they are now
+    if on("closure torque"):
+        _find_spin(model, state, work)
     if work.ties:
         ties.begin_closure(x, work)
     w, c = work.implicit, work.contacts
@@ -74,6 +80,27 @@ def close(model: Model, x: wp.array, work: Work, look: int) -> None:
     _repeat(model, x, work, look, _solve_gaps)
     if work.ties:
         ties.settle(model, x, work, keeps=False)
+    if on("closure torque"):
+        _keep_spin(model, state, work)
+
+
+def _find_spin(model: Model, state: State, work: Work) -> None:
+    w = work.implicit
+    outputs = [w.bodies, w.kept, w.spin]
+    wp.launch(spin.find_spin, model.n_body, inputs=[state.x, state.v], outputs=outputs)
+
+
+def _keep_spin(model: Model, state: State, work: Work) -> None:
+    """Let bodies turn so that the closure has changed no angular momentum."""
+    w, c = work.implicit, work.contacts
+    place(model, state.x, w)
+    inputs = [c.n, c.record, state.v, w.bodies, w.kept]
+    outputs = [work.surface.push, c.part]
+    launch_over(spin.lost_spin, work.capacity.contacts, inputs=inputs, outputs=outputs)
+    inputs = [c.graph, c.part, w.touched, w.busy, state.x, state.v, w.bodies, w.spin]
+    wp.launch(spin.find_rotation, model.n_body, inputs=inputs, outputs=[w.kept])
+    inputs = [w.busy, w.bodies, w.kept]
+    wp.launch(spin.turn_back, model.n_vert, inputs=inputs, outputs=[state.x, state.v])
 
 
 def _repeat(model: Model, y: wp.array, work: Work, look: int, solve: Callable, *given) -> None:

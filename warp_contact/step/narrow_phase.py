@@ -25,7 +25,7 @@ def find_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
     """Contacts of the vertices inside other bodies at ``x``, in a step from ``x0``."""
 
     def find() -> None:
-        _find_penetrations(model, x, work)
+        _find_penetrations(model, x0, x, work)
         if_any(work.contacts.n_vertex, make_contacts, otherwise=work.contacts.n.zero_)
 
     def make_contacts() -> None:
@@ -99,21 +99,21 @@ def append_edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
     count_contacts(work, n.n_crossing, n.n_place)
 
 
-def _find_penetrations(model: Model, x: wp.array, work: Work) -> None:
-    """Set the vertices inside other bodies at ``x``, sorted by vertex and body."""
+def _find_penetrations(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+    """Set the vertices inside other bodies at ``x``, or gone through, by vertex and body."""
     b, n = work.broad_phase, work.narrow_phase
     track(model, x, b.verts.travel, work)
     launch_over(
         vertices.find_penetrations,
         work.capacity.verts,
-        inputs=[work.mesh, b.verts.list, b.verts.travel.travelled, x],
+        inputs=[work.mesh, b.verts.list, b.verts.travel.travelled] + [model.body_thickness, x0, x],
         outputs=[b.verts.clear_until, n.inside_at],
     )
     scan(n.inside_at, work.scan, inclusive=False)
     launch_over(
         vertices.list_penetrations,
         work.capacity.verts,
-        inputs=[model.n_body, b.verts.list, n.inside_at],
+        inputs=[model.n_body, b.verts.list, n.inside_at, b.verts.clear_until],
         outputs=[n.penetration, n.layer, n.pending],
     )
 

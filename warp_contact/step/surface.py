@@ -18,6 +18,7 @@ from warp_contact.kernels.worlds import FIRST_LOOK, SECOND_LOOK
 from warp_contact.step import coupled, residual, search, sweeps
 from warp_contact.step.contact_graph import add_parts
 from warp_contact.step.detection import detect
+from warp_contact.step.motion import explicit_part
 
 
 def close_gaps(model: Model, state: State, work: Work, iterations: int) -> None:
@@ -79,10 +80,10 @@ def close(
         outputs=[s.slack, s.push],
     )
     if work.implicit:
-        coupled.close(model, state.x, work, look)
+        coupled.close(model, state, work, look)
     else:
         sweeps.repeat(work, look, False, _sweep, model, state.x, work)
-    if on("closure torque"):
+    if on("closure torque") and explicit_part(model, work):
         launch_over(
             closure.torques,
             work.capacity.contacts,

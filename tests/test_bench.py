@@ -89,6 +89,6 @@ def test_copies_do_not_share_a_world():
 
 def test_a_case_is_timed_as_a_whole():
     case = Case(load("squeezed_sphere").build, 2)
-    found = figures(case, frames=None, repeats=1, device=None)
+    found = figures(case, None, 1, "explicit", None)
     assert found["step.ms"] > 0.0 and 0.0 < found["frame.choice_of_step_share"] < 1.0
     assert found["substeps"] > 10

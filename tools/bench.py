@@ -1,7 +1,7 @@
 """Where time and memory go: one figure a line, as ``case.figure value``.
 
     python tools/bench.py [case ...] [--large] [--frames N] [--fraction PART]
-        [--repeats N] [--device NAME]
+        [--repeats N] [--integrator KIND] [--device NAME]
 
 Each case runs in a process of its own until there are contacts, then the same few steps again and
 again (a window, begun from the same state each time): as one captured graph, and uncaptured with a
@@ -16,12 +16,14 @@ so that other processes on the machine hardly count; those of frames and starts 
     step.operations_ms         sum of all operations, each without what its call costs
     step.overhead_us_per_launch  what the captured step takes beyond that, for each operation
     step.overhead_us           the same for the step
+    step.us_per_contact        what contact adds to the step, for each
     step.of_bound              step.ms over 90 ns a tet, 150 ns a surface vertex, 1 us a contact
     STAGE.launches, .ms        of a stage: what a module of ``warp_contact/step`` launches itself;
                                ``step_alone`` is ``step.py``
     STAGE.share                of the sum of all operations
     frames_per_second          of whole frames of 1/60 s, with the choice of the step
     frame.choice_of_step_share    of the time of these frames
+    frame.launches             step.launches times the steps of a frame
     contacts                   at the end of a step
     window_steps               steps of the window
     array_bytes_per_vertex     of the Warp arrays of model, state and work; without the Bvhs
@@ -46,6 +48,8 @@ from clock.scenes import FRACTION, PAIRS, Case, cases
 from measure import machine
 from measure.run import command_line, count, one_of
 
+from warp_contact.frame.integrator import KINDS
+
 OTHERS = {"sleep": sleep_figures, "start": start_times}  # cases with figures of their own
 
 
@@ -58,6 +62,7 @@ def main() -> int:
     parser.add_argument("--frames", type=count, help="to run before, in place of each case's own")
     parser.add_argument("--fraction", type=float, default=FRACTION, help="of the bowl's fruits")
     parser.add_argument("--repeats", type=count, default=7, help="of a window")
+    parser.add_argument("--integrator", default="explicit", choices=KINDS)
     parser.add_argument("--device", help="cpu, cuda:0, ...")
     args = parser.parse_args()
     known = cases(True, args.fraction)
@@ -65,7 +70,8 @@ def main() -> int:
     timed = {name: case for name, case in known.items() if name in chosen}
     print(machine.line(args.device), "", sep="\n", flush=True)
     found: dict[str, float] = {}
-    run = partial(figures, frames=args.frames, repeats=args.repeats, device=args.device)
+    given = {"frames": args.frames, "repeats": args.repeats, "integrator": args.integrator}
+    run = partial(figures, device=args.device, **given)
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, spawn, max_tasks_per_child=1) as pool:
         for name, new in zip(timed, pool.map(run, timed.values()), strict=True):

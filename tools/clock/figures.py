@@ -31,10 +31,13 @@ SHOWN_FRAMES = 3  # of which the median gives the frames per second
 BOUND = 90.0, 150.0, 1000.0  # ns that a tet, a surface vertex, a contact with its sweeps may take
 
 
-def figures(case: Case, frames: int | None, repeats: int, device: str | None) -> dict[str, float]:
+def figures(
+    case: Case, frames: int | None, repeats: int, integrator: str, device: str | None
+) -> dict[str, float]:
     """Run a case until there are contacts, then time it."""
     wp.config.log_level = wp.LOG_WARNING
-    sim = wc.Simulation(case.build(), substeps=case.substeps, device=device)
+    chosen = {"substeps": case.substeps, "integrator": integrator, "device": device}
+    sim = wc.Simulation(case.build(), **chosen)
     frame_times(sim, case.frames if frames is None else frames)
     timing, model, spectrum = measure(sim, repeats), sim.model, sim._stepper.spectrum
     choice, rates = [], spectrum.rates
@@ -56,6 +59,7 @@ def figures(case: Case, frames: int | None, repeats: int, device: str | None) ->
         "substeps": sim.substeps,
         "window_steps": timing.steps,
         **step_figures(timing, model),
+        "frame.launches": sim.substeps * sum(cost.launches for cost in timing.stages.values()),
         "frames_per_second": 1.0 / median(times),
         "frame.choice_of_step_share": sum(choice) / sum(times),
         "array_bytes_per_vertex": timing.bytes / model.n_vert,
@@ -79,6 +83,7 @@ def step_figures(timing: Timing, model) -> dict[str, float]:
         "step.operations_ms": operations,
         "step.overhead_us_per_launch": overhead / launches,
         "step.overhead_us": overhead,
+        "step.us_per_contact": 1e3 * (step - timing.elastic_ms) / (timing.contacts or np.nan),
         "step.of_bound": 1e6 * step / bound,
     }
     for stage, cost in timing.stages.items():

@@ -15,7 +15,7 @@ from warp_contact.usd.writer import UsdWriter
 class FakeSimulation:
     """Waving cubes: the interface the writer needs, with positions known at every frame."""
 
-    BODY: ClassVar[dict] = {"world": 0, "friction": None, "start": None}
+    BODY: ClassVar[dict] = {"world": 0, "start": None}
 
     def __init__(self, labels=("left", "right"), n=4, fps=60):
         """Unit cubes of n^3 cells in a row along x."""
@@ -55,8 +55,9 @@ class FakeSimulation:
             ],
             gravity=self.model.gravity,
             friction=0.5,
-            plane_friction=[None],
             attachments=[],
+            restitution=0.0,
+            coefficients=lambda name: (k + 1) * [0.5 if name == "friction" else 0.0],
         )
         self.fps, self.frame = fps, 0
 

@@ -48,7 +48,7 @@ def paper(n: int, name: str, **arguments) -> Run:
 def run(
     n: int, *bodies: dict, response=None, fps=60, substeps=None, integrator="explicit", **around
 ) -> Run:
-    """Bodies among what is ``around``: gravity, friction and planes."""
+    """Bodies among what is ``around``: gravity, coefficients and planes."""
     given = response, fps, substeps
     return frames(wc.Simulation(scene(*bodies, **around), *given, integrator=integrator), n)
 
@@ -194,6 +194,7 @@ RUNS: dict[str, Callable[[], Run]] = {
     "implicit_crushed": partial(run, 8, *CRUSHED, planes=[UP], integrator="implicit"),
     "implicit_crossed": partial(run, 20, *CROSSED, integrator="implicit"),
     "rigid": partial(run, 30, *RIGID, planes=[UP], friction=0.5),
+    "bouncing": partial(run, 20, *RIGID, planes=[UP], friction=0.5, restitution=0.7),
     "mixed": partial(run, 6, *MIXED, planes=[UP], friction=0.5, integrator="implicit"),
     "sheets": partial(paper, 10, "membrane_stack", count=3, gap=0.002),  # vertex on vertex
 }

@@ -257,14 +257,28 @@ class BetweenFrames:
         Raises:
             ValueError: there is no such body or plane, or it is negative or not finite
         """
-        friction = checks.number(friction, "friction", least=0.0)
+        self._set_coefficient("friction", of, checks.number(friction, "friction", least=0.0))
+
+    def set_restitution(self, of: Body | int | str, restitution: float) -> None:
+        """Set the coefficient of restitution as ``set_friction`` does.
+
+        Raises:
+            ValueError: there is no such body or plane, it is not from 0 to 1, or steps take none
+        """
+        self._set_coefficient(
+            "restitution", of, checks.number(restitution, "restitution", 0.0, 1.0)
+        )
+
+    def _set_coefficient(self, name: str, of: Body | int | str, value: float) -> None:
         index = self._bodies.index_or_plane(of)
         of_body = self._stepper.worlds.of_body
         woken = np.ones(self._stepper.worlds.n, dtype=bool)
         if index < self.model.n_body:
             woken = np.arange(len(woken)) == of_body[index]
         with exclusively(self.device):
-            self._surroundings.set_friction(index, friction)
+            if name == "restitution" and value:
+                self._stepper.buffers.let_rebound()
+            self._surroundings.set_coefficient(name, index, value)
             self._wake(woken)
 
     def _wake(self, worlds: np.ndarray) -> None:

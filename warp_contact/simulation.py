@@ -174,7 +174,7 @@ class Simulation(BetweenFrames, ContactData, Joined):
         """Begin anew: the next frames give the bits of the first ones.
 
         With ``worlds``, bodies in these alone are put where they began; ``frame`` and others go on,
-        and gravity and friction stay.
+        and gravity, friction and restitution stay.
 
         Raises:
             ValueError: no body is in one of the worlds
@@ -238,8 +238,8 @@ class Simulation(BetweenFrames, ContactData, Joined):
         with exclusively(self.device):
             self.state.x.assign(values["x"])
             self.state.v.assign(values["v"])
-            memory.restore(self._stepper, values)
             self._surroundings.restore(**checkpoint.group(values, "surroundings"))
+            memory.restore(self._stepper, values)
             self._meter = Meter(self.model)
             self._meter.tunnelling.remember(checkpoint.group(values, "meter"))
             self._moves.restore(checkpoint.group(values, "moves"))

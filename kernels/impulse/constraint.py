@@ -40,6 +40,7 @@ class Constraint:
     turn: mat53  # b_k [1/m]
     friction: float  # coefficient, 0 across a gap that is too wide
     ramp: wp.vec3  # t of tangent.py, 0 where the facet does not lean
+    parting: float  # [m/s] of its sides, of rebound.py, else 0
 
 
 @wp.struct
@@ -64,6 +65,12 @@ def inverse_mass(c: Contact, graph: ContactGraph, bodies: Mobility) -> float:
         else:
             w += a * a * mobility_of(i, bodies) * float(contacts_of(i, graph))
     return w
+
+
+@wp.func
+def least_closing(to: Constraint) -> float:
+    """How fast the sides may close [m/s]; negative where they have to part."""
+    return wp.max(to.gap_bound, 0.0) - to.parting
 
 
 @wp.func

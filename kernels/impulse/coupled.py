@@ -9,7 +9,7 @@ Within the sweeps only touched vertices move, then the sum of all impulses moves
 import warp as wp
 
 from warp_contact.kernels.implicit.bodies import LUMPED, Implicit
-from warp_contact.kernels.impulse.constraint import Constraint, Impulse
+from warp_contact.kernels.impulse.constraint import Constraint, Impulse, least_closing
 from warp_contact.kernels.impulse.impulse import (
     Limits,
     add_to_parts,
@@ -46,7 +46,7 @@ def find_counted(
     for c in range(wp.tid(), n_contact[0], threads):
         at = contact[c]
         excess = wp.dot(surface_velocity(at, constraint[c], v), at.normal)
-        excess += wp.max(constraint[c].gap_bound, 0.0)
+        excess += least_closing(constraint[c])
         counted[c] = int(0)
         if impulse[c].ahead[3] > 0.0 or excess < 0.0:
             counted[c] = 1
@@ -92,7 +92,7 @@ def solve_contacts(
         n = at.normal
         u = surface_velocity(at, to, v)
         un = wp.dot(u, n)
-        excess = un + wp.max(to.gap_bound, 0.0)
+        excess = un + least_closing(to)
         before = impulse[c]
         w = row_weight(at, row) * (to.inv_mass_turning / to.inv_mass)
         h = dt[at.vert[0]]

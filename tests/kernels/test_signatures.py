@@ -221,4 +221,4 @@ def test_only_integers_are_summed_by_atomics():
                 for node in ast.walk(function):
                     if isinstance(node, ast.Call) and ast.unparse(node.func) in SUMS:
                         summed.add(kinds[root(node.args[0])])
-    assert summed == {"wp.array[int]", "wp.array2d[wp.int64]"}
+    assert summed == {"wp.array[int]", "wp.array[wp.int64]", "wp.array2d[wp.int64]"}

@@ -108,3 +108,15 @@ def test_frames_without_inner_vertices_are_refused_and_motion_that_is_lost_is_li
         found = wc.Scene.from_usd(tmp_path / "slow", at="last")
     lines = ["no velocities of /World/a at 4: it is at rest"]
     assert found.not_read == [*lines, "the motion of /World/tool, which is driven: it stands still"]
+
+
+def test_restitution_is_read_back(tmp_path):
+    scene = wc.Scene(restitution=0.3)
+    scene.add_plane((0.0, 0.0, 1.0), restitution=0.6)
+    scene.add_body(MESH, wc.Rigid(1000.0), (0, 0, 0.1), restitution=0.8)
+    scene.add_body(MESH, wc.Rigid(1000.0), (1, 0, 0.1))
+    written(tmp_path / "run", scene, 1)
+    found = wc.Scene.from_usd(tmp_path / "run")
+    assert found.not_read == []
+    assert found.restitution == 0.3
+    assert found.coefficients("restitution") == [0.8, 0.3, 0.6]

@@ -67,9 +67,9 @@ def body(mesh: wc.TetMesh, material=None, at=NONE, turn=(0.0, 0.0, 0.0, 1.0), v=
     return given | {"velocity": v} | more
 
 
-def scene(*bodies: dict, gravity=DOWN, friction=0.3, planes=()) -> wc.Scene:
+def scene(*bodies: dict, gravity=DOWN, friction=0.3, planes=(), restitution=0.0) -> wc.Scene:
     """Bodies on the half-spaces above the planes through the origin with these normals."""
-    made = wc.Scene(gravity, friction=friction)
+    made = wc.Scene(gravity, friction, restitution)
     for normal in planes:
         made.add_plane(normal)
     for arguments in bodies:

@@ -46,7 +46,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Model:
-    """What does not change during a run, gravity and friction within a frame.
+    """What does not change during a run, gravity, friction and restitution within a frame.
 
     Attributes:
         labels: name of each body
@@ -56,6 +56,7 @@ class Model:
         gravity: acceleration [m/s^2], NumPy, shape (3,)
         g: the same where kernels read it, shape (1,)
         friction: Coulomb coefficient of each body, then of each plane, shape (n_body + n_plane,)
+        restitution: the same of restitution
         n_body: number of bodies
         n_vert: number of vertices
         n_tet: number of tets
@@ -101,6 +102,7 @@ class Model:
     gravity: np.ndarray
     g: wp.array
     friction: wp.array
+    restitution: wp.array
     n_body: int
     n_vert: int
     n_tet: int

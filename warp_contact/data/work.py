@@ -12,6 +12,7 @@ from warp_contact.data import (
     implicit,
     narrow_phase,
     overflow,
+    rebound,
     scan,
     surface,
     sweeps,
@@ -52,6 +53,7 @@ class Work:
         forces: what contact did in the frame
         warm: the impulses of the last step
         ties: the attachments; None where there is none
+        rebound: of impacts; None where no body has a coefficient of restitution
     """
 
     capacity: overflow.Capacity
@@ -75,6 +77,7 @@ class Work:
     forces: contact_forces.ContactForces
     warm: warm_start.WarmStart
     ties: TieWork | None
+    rebound: rebound.Rebound | None
 
 
 def everything(model: Model) -> Awake:
@@ -100,8 +103,7 @@ def allocate_work(
     ``unit`` is the resolution of the recorded impulses [N s], ``awake`` what moves, None for
     everything, ``shapes`` and ``ties`` of implicit bodies and attachments, None where none is.
     """
-    n, m = model.n_vert, capacity.contacts
-    awake = awake or everything(model)
+    n, m, awake = model.n_vert, capacity.contacts, awake or everything(model)
     broad = broad_phase.allocate(model, state.x, capacity)
     narrow = narrow_phase.allocate(capacity, n_world(model))
     of_surface = surface.allocate(n_world(model), model.n_body, n, model.n_tet, m)
@@ -130,7 +132,15 @@ def allocate_work(
         forces=forces,
         warm=warm_start.allocate(n, m, shapes is not None),
         ties=ties,
+        rebound=None,
     )
+
+
+def let_rebound(work: Work) -> None:
+    """Allocate what impacts need, where there is none yet."""
+    if not work.rebound:
+        n_body = len(work.awake.bodies)
+        work.rebound = rebound.allocate(len(work.dt), n_body, work.contacts, work.worlds)
 
 
 def forget(work: Work) -> None:

@@ -8,8 +8,9 @@ from warp_contact.data.implicit import Shapes, set_blocks
 from warp_contact.data.model import Model
 from warp_contact.data.overflow import Capacity
 from warp_contact.data.state import Awake, State
-from warp_contact.data.work import Work, allocate_work
+from warp_contact.data.work import Work, allocate_work, let_rebound
 from warp_contact.frame.implicit_shapes import Inverses
+from warp_contact.frame.integrator import refuse_restitution
 from warp_contact.frame.worlds import Worlds
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
@@ -96,6 +97,13 @@ class Buffers:
             self.work = self._allocate(before)
             raise
 
+    def let_rebound(self) -> None:
+        """Let there be restitution from now on; raises ValueError where steps take none."""
+        refuse_restitution(self.response, self.shapes is not None)
+        if not self.work.rebound:
+            let_rebound(self.work)
+            self._graphs.clear()
+
     def mend(self, n_pair: int) -> None:
         """Allocate anew, for ``n_pair`` pairs, where an interrupt came while they were replaced."""
         if not hasattr(self, "work"):
@@ -114,6 +122,8 @@ class Buffers:
     def _allocate(self, capacity: Capacity) -> Work:
         given = self._awake, self.unit, self.shapes, self._ties
         work = allocate_work(self._model, self._state, capacity, *given)
+        if self._model.restitution.numpy().any():
+            let_rebound(work)
         if len(self._steps):
             self._set_blocks(work, self._steps)
         explicit = self.shapes.explicit if self.shapes else self._model

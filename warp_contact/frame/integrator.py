@@ -21,6 +21,7 @@ KINDS = "explicit", "implicit", "auto"
 DEARER = 3.0  # time of an implicit step, in explicit ones, of bodies of few vertices
 DENSE = 15.0  # vertices of a body that add as much as an explicit step: an inverse is dense
 BESIDE = 1.2  # the same of bodies that take explicit ones beside them: their number is rounded up
+REMEDY = "take integrator='implicit'"
 NAMED = 3  # bodies that a summary names
 
 
@@ -55,15 +56,17 @@ def choose(
     """
     obstacle = _obstacle(model, response)
     rigid = _rigid(model)
+    bounces = model.restitution.numpy().any()
+    if bounces:
+        refuse_restitution(response)
     if rigid:
         if obstacle:
             raise ValueError(f"body '{rigid}' is rigid and takes implicit steps: {obstacle}")
         return Integrator(True, f"body '{rigid}' is rigid{_beside(model)}")
-    if model.ties:
-        name = f"attachment '{model.ties.labels[0]}'"
+    if model.ties or bounces:
+        name = f"attachment '{model.ties.labels[0]}'" if model.ties else "restitution"
         if obstacle or wanted == "explicit":
-            remedy = obstacle or "take integrator='implicit'"
-            raise ValueError(f"{name} needs implicit steps: {remedy}")
+            raise ValueError(f"{name} needs implicit steps: {obstacle or REMEDY}")
         return Integrator(True, f"{name} needs them{_beside(model)}")
     if wanted == "explicit":
         return Integrator(False, "the default")
@@ -76,6 +79,14 @@ def choose(
     if obstacle:
         return Integrator(False, obstacle)
     return _cheaper(model, state)
+
+
+def refuse_restitution(response, implicit: bool = True) -> None:
+    """Raise ValueError where a response, or explicit steps, take no restitution."""
+    if not isinstance(response, ContactSurface):
+        raise ValueError(f"restitution needs wc.ContactSurface(), and {response} is given")
+    if not implicit:
+        raise ValueError(f"restitution needs implicit steps: {REMEDY}")
 
 
 def _cheaper(model: Model, state: State) -> Integrator:

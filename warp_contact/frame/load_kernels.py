@@ -13,7 +13,9 @@ from warp_contact.kernels.impulse import (
     coupled,
     impulse,
     pair_impulses,
+    rebound,
     rows,
+    strike,
     warm_start,
 )
 from warp_contact.kernels.motion import lanczos, motion
@@ -46,5 +48,6 @@ def load_kernels(model: Model, device: wp.Device, implicit: bool) -> None:
     """
     modules = {*ALWAYS, *(IMPLICIT if implicit else ()), *(e.kernels for e in model.elements)}
     modules |= {*(TIES if model.ties else ())}
+    modules |= {*((rebound, strike) if model.restitution.numpy().any() else ())}
     names = sorted(module.__name__ for module in modules)
     wp.force_load(device, [wp.get_module(name) for name in names])

@@ -35,7 +35,8 @@ def assemble(scene: Scene) -> tuple[Model, State]:
         elements=_elements(scene, tet0),
         gravity=np.array(scene.gravity),
         g=wp.array([scene.gravity], dtype=wp.vec3),
-        friction=_floats(_friction(scene)),
+        friction=_floats(scene.coefficients("friction")),
+        restitution=_floats(scene.coefficients("restitution")),
         n_body=len(bodies),
         n_vert=len(x),
         n_tet=len(tets),
@@ -51,12 +52,6 @@ def assemble(scene: Scene) -> tuple[Model, State]:
     )
     starts = np.concatenate([body.starts for body in bodies])
     return model, State(x=wp.array(starts, dtype=wp.vec3), v=wp.array(v, dtype=wp.vec3))
-
-
-def _friction(scene: Scene) -> list[float]:
-    """Coulomb coefficient of each body, then of each plane."""
-    own = [*(body.friction for body in scene.bodies), *scene.plane_friction]
-    return [scene.friction if mu is None else mu for mu in own]
 
 
 def _first(bodies: Sequence[Body], part: str) -> np.ndarray:

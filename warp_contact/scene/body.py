@@ -24,6 +24,7 @@ class Body:
         fixed: which vertices follow a prescribed velocity, shape (n,), bool
         world: bodies of different worlds never touch
         friction: its Coulomb coefficient, None for that of the scene
+        restitution: its coefficient of restitution, the same
         render: surface to draw in place of that of its tets, in the frame of the mesh, or None
         start: positions [m] in which it starts, shape (n, 3), if it is deformed then; else None,
             and it starts at ``x``
@@ -38,6 +39,7 @@ class Body:
     fixed: np.ndarray = field(repr=False)
     world: int
     friction: float | None = None
+    restitution: float | None = None
     render: Surface | None = None
     start: np.ndarray | None = field(default=None, repr=False)
 

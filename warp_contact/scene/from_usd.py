@@ -33,8 +33,9 @@ def fill(scene, path, at, material) -> None:
         arrays = dict(archive)
     found = json.loads(str(arrays.pop("scene")))
     scene.gravity = found["gravity"]
-    if found["friction"] is not None:
-        scene.friction = found["friction"]
+    for name in ("friction", "restitution"):
+        if found[name] is not None:
+            setattr(scene, name, found[name])
     said = found["not_read"]
     for k, info in enumerate(found["bodies"]):
         own = {n.partition(".")[2]: a for n, a in arrays.items() if n.startswith(f"{k}.")}
@@ -48,7 +49,8 @@ def fill(scene, path, at, material) -> None:
         except ValueError as error:
             said.append(f"{info['path']}: {error}")
     for plane in found["planes"]:
-        scene.add_plane(plane["normal"], plane["offset"], plane["friction"])
+        own = plane["friction"], plane["restitution"]
+        scene.add_plane(plane["normal"], plane["offset"], *own)
     scene.not_read = [*said, *found["only_seen"]]
     if said:
         more = f" and {len(said) - 1} more, see scene.not_read" if len(said) > 1 else ""
@@ -85,6 +87,7 @@ def add_body(scene, info: dict, arrays: dict, material, said: list[str]) -> None
         label=label_of(scene, info),
         world=info["world"],
         friction=info["friction"],
+        restitution=info["restitution"],
     )
     if "start" in arrays:
         start = checks.numbers(arrays["start"], body.x.shape, "points", HUGE)

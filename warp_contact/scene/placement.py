@@ -4,7 +4,10 @@ import warnings
 
 import numpy as np
 
+from warp_contact import checks
 from warp_contact.kernels.lengths import REST_GAP, SAME_PLACE
+from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.surface import Surface
 
 ROUNDING = 2.0**-24  # of a float32, at most
 # Resting gaps by which rounding may move a body. At 1.5, 5000 edges away, blocks that fall and come
@@ -13,6 +16,32 @@ DROWNED = 1.5
 STRAINED = 0.02  # strain that rounding of the positions may put on a tet
 POSSIBLE = 1e-8, 1e9  # size of a body [m] whose masses and volumes fit float32
 PLAUSIBLE = 0.9e-6, 1.1e3  # size of a body [m]; others run too
+
+
+def check_given(mesh, material, label: str, render) -> None:
+    """Raises ValueError for what is no mesh, material or render surface, or a class not called."""
+    if not isinstance(mesh, TetMesh):
+        such = "wc.shell(surface, 0.01)" if isinstance(mesh, Surface) else "wc.box(0.1, 2)"
+        raise checks.refuse("mesh", mesh, f"a TetMesh, such as {such}")
+    if isinstance(material, type) or not callable(getattr(material, "check", None)):
+        wanted = "a material, such as wc.NeoHookean(1e5, 0.4, 1000.0)"
+        raise checks.refuse("material", material, wanted)
+    material.check()
+    check_shape(mesh, label)
+    if render is not None:
+        _check_render(render, mesh)
+
+
+def _check_render(render, mesh: TetMesh) -> None:
+    """Raises ValueError for what is no surface, or lies elsewhere than its mesh."""
+    checks.instance(render, Surface, "render", "a wc.Surface")
+    x, size = mesh.vertices, float(np.ptp(mesh.vertices, axis=0).max())
+    off = np.maximum(render.vertices - x.max(axis=0), x.min(axis=0) - render.vertices).max()
+    if off > size:
+        raise ValueError(
+            f"its render surface reaches {off:.3g} m away from its mesh of {size:.3g} m: give it "
+            f"in the frame and the unit of the mesh"
+        )
 
 
 def check_shape(mesh, label: str) -> None:

@@ -23,7 +23,7 @@ from warp_contact.scene.reading_stage import (
     tidy,
     times,
 )
-from warp_contact.scene.reading_surroundings import friction_of, half_spaces, surroundings
+from warp_contact.scene.reading_surroundings import coefficients_of, half_spaces, surroundings
 
 SOFT = {"PhysicsDeformableBodyAPI", "OmniPhysicsDeformableBodyAPI", "PhysxDeformableBodyAPI"}
 SIM = {"PhysicsVolumeDeformableSimAPI", "OmniPhysicsVolumeDeformableSimAPI"}
@@ -97,13 +97,12 @@ def common(reader: Reader, owner, prim) -> dict:
         "label": note(owner, "label", owner.GetName()),
         "world": note(owner, "world", 0),
         "fixed": bool(reader.physics(owner, "kinematicEnabled") or note(owner, "fixed")),
-        "friction": friction_of(reader, look),
         "density": times(given(reader, (owner, prim, look), "density"), m / d**3),
         "mass": times(given(reader, (owner, prim), "mass"), m),
         "youngs_modulus": times(reader.physics(look, "youngsModulus"), m / d),
         "poisson_ratio": reader.physics(look, "poissonsRatio"),
     }
-    return values | {name: note(look, name) for name in NOTES}
+    return values | coefficients_of(reader, look) | {name: note(look, name) for name in NOTES}
 
 
 def given(reader: Reader, prims: tuple, name: str):

@@ -1,4 +1,4 @@
-"""A scene: bodies of tets with their materials, half-spaces, gravity and friction."""
+"""A scene: bodies of tets with their materials, half-spaces, gravity, friction, restitution."""
 
 import re
 from numbers import Integral
@@ -15,6 +15,7 @@ from warp_contact.scene.surface import Surface
 from warp_contact.scene.topology import HUGE
 
 PLANE = re.compile(r"plane\d+")  # names of half-spaces in measurements
+COEFFICIENTS = {"friction": (0.0, checks.LARGEST), "restitution": (0.0, 1.0)}  # least, most
 
 
 class Scene:
@@ -24,21 +25,24 @@ class Scene:
         gravity: acceleration [m/s^2]
         friction: Coulomb coefficient of bodies and half-spaces without one of their own [-];
             between two of them the mean of theirs counts
+        restitution: the same of restitution, 0 to 1 [-]
         bodies: in the order in which they were added
         planes: (outward unit normal, offset along it [m]) of each half-space
-        plane_friction: the coefficient of each half-space, None for that of the scene
+        plane_friction, plane_restitution: the coefficients of each half-space, None for that of the
+            scene
         attachments: what holds bodies at each other, in the order in which they were added
         not_read: what a USD stage holds and ``from_usd`` did not read or had to assume, in words
     """
 
-    def __init__(self, gravity=(0.0, 0.0, -9.81), friction: float = 0.3):
-        """Raises ValueError for a gravity that is not three numbers or a negative friction."""
+    def __init__(self, gravity=(0.0, 0.0, -9.81), friction: float = 0.3, restitution: float = 0.0):
+        """Raises ValueError for a gravity that is not three numbers or a wrong coefficient."""
         self.gravity = gravity
-        self.friction = friction
+        self.friction, self.restitution = friction, restitution
         self.bodies: list[Body] = []
         self._labels: set[str] = set()
         self.planes: list[tuple[np.ndarray, float]] = []
         self.plane_friction: list[float | None] = []
+        self.plane_restitution: list[float | None] = []
         self.attachments: list[Attachment] = []
         self.not_read: list[str] = []
 
@@ -72,15 +76,16 @@ class Scene:
         self._refuse_if_frozen(name)
         if name == "gravity":
             value = tuple(checks.numbers(value, (3,), name).tolist())
-        elif name == "friction":
-            value = checks.number(value, name, least=0.0)
+        elif name in COEFFICIENTS:
+            value = checks.number(value, name, *COEFFICIENTS[name])
         super().__setattr__(name, value)
 
     def freeze(self) -> None:
         """Let nothing be changed or added from now on: a simulation does not see it."""
         if "_frozen" not in vars(self):
-            for name in ("bodies", "planes", "plane_friction", "attachments"):
-                setattr(self, name, tuple(getattr(self, name)))
+            for name, value in list(vars(self).items()):
+                if isinstance(value, list) and name != "not_read":
+                    setattr(self, name, tuple(value))
             self._frozen = True
 
     def _refuse_if_frozen(self, what: str) -> None:
@@ -101,6 +106,7 @@ class Scene:
         angular_velocity=(0.0, 0.0, 0.0),
         friction: float | None = None,
         render: Surface | None = None,
+        restitution: float | None = None,
     ) -> Body:
         """Place a copy of a rest shape: x = R vertices + position.
 
@@ -114,23 +120,22 @@ class Scene:
             label: name, unique in the scene and no ``plane<index>``; by default ``body<index>``
             world: bodies of different worlds never touch
             angular_velocity: about the centre of mass, on top of ``velocity`` [rad/s]
-            friction: Coulomb coefficient, in place of that of the scene
             render: surface to draw, in the frame of the mesh, which follows its tets
+            friction: Coulomb coefficient, in place of that of the scene
+            restitution: the same of restitution, 0 to 1
 
         Raises:
             ValueError: naming the body, for input that cannot be simulated
         """
         label = self.new_label(label)
         try:
-            _check_shape(mesh, material, label, render)
-            world, friction = checks.count(world, "world", least=0), _coefficient(friction)
-            x = _placed(mesh.vertices, position, rotation)
-            v = _velocities(mesh, material, x, (position, rotation), velocity, angular_velocity)
-            mask = _mask(fixed, len(x), isinstance(material, Rigid), angular_velocity)
+            placement.check_given(mesh, material, label, render)
+            own = _given("friction", friction), _given("restitution", restitution)
+            start = _start(mesh, material, (position, rotation), velocity, angular_velocity, fixed)
+            placed = mesh, material, *start, checks.count(world, "world", least=0)
         except (ValueError, TypeError, AttributeError) as error:
             raise ValueError(f"body '{label}': {error}") from None
-        placed = mesh, material, x, v, mask, world, friction, render
-        self.bodies.append(body := Body(len(self.bodies), label, *placed))
+        self.bodies.append(body := Body(len(self.bodies), label, *placed, *own, render))
         self._labels.add(label)
         return body
 
@@ -144,14 +149,27 @@ class Scene:
             raise ValueError(f"body '{label}': this is how a half-space is called")
         return label
 
-    def add_plane(self, normal, offset: float = 0.0, friction: float | None = None) -> None:
-        """Keep every body in the half-space normal . x >= offset [m]; ``friction`` as of a body."""
+    def add_plane(
+        self,
+        normal,
+        offset: float = 0.0,
+        friction: float | None = None,
+        restitution: float | None = None,
+    ) -> None:
+        """Keep every body in the half-space normal . x >= offset [m]; coefficients as of a body."""
         self._refuse_if_frozen("a plane")
         n = _unit(checks.numbers(normal, (3,), "plane normal"), "plane normal")
         offset = checks.number(offset, "plane offset", -HUGE, HUGE)
-        friction = _coefficient(friction)
+        friction, restitution = _given("friction", friction), _given("restitution", restitution)
         self.planes.append((n, offset))
         self.plane_friction.append(friction)
+        self.plane_restitution.append(restitution)
+
+    def coefficients(self, name: str) -> list[float]:
+        """``friction`` or ``restitution`` of each body, then of each plane."""
+        of_bodies = [getattr(body, name) for body in self.bodies]
+        own = [*of_bodies, *getattr(self, f"plane_{name}")]
+        return [getattr(self, name) if c is None else c for c in own]
 
     def attach(
         self,
@@ -220,8 +238,8 @@ def rotation_matrix(quaternion) -> np.ndarray:
     )
 
 
-def _coefficient(friction) -> float | None:
-    return None if friction is None else checks.number(friction, "friction", least=0.0)
+def _given(name: str, value) -> float | None:
+    return None if value is None else checks.number(value, name, *COEFFICIENTS[name])
 
 
 def _unit(vector: np.ndarray, name: str) -> np.ndarray:
@@ -231,30 +249,13 @@ def _unit(vector: np.ndarray, name: str) -> np.ndarray:
     return vector / length
 
 
-def _check_shape(mesh, material, label: str, render) -> None:
-    """Raises ValueError for what is no mesh, material or render surface, or a class not called."""
-    if not isinstance(mesh, TetMesh):
-        such = "wc.shell(surface, 0.01)" if isinstance(mesh, Surface) else "wc.box(0.1, 2)"
-        raise checks.refuse("mesh", mesh, f"a TetMesh, such as {such}")
-    if isinstance(material, type) or not callable(getattr(material, "check", None)):
-        wanted = "a material, such as wc.NeoHookean(1e5, 0.4, 1000.0)"
-        raise checks.refuse("material", material, wanted)
-    material.check()
-    placement.check_shape(mesh, label)
-    if render is not None:
-        _check_render(render, mesh)
-
-
-def _check_render(render, mesh: TetMesh) -> None:
-    """Raises ValueError for what is no surface, or lies elsewhere than its mesh."""
-    checks.instance(render, Surface, "render", "a wc.Surface")
-    x, size = mesh.vertices, float(np.ptp(mesh.vertices, axis=0).max())
-    off = np.maximum(render.vertices - x.max(axis=0), x.min(axis=0) - render.vertices).max()
-    if off > size:
-        raise ValueError(
-            f"its render surface reaches {off:.3g} m away from its mesh of {size:.3g} m: give it "
-            f"in the frame and the unit of the mesh"
-        )
+def _start(
+    mesh: TetMesh, material, place: tuple, velocity, angular_velocity, fixed
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions [m], velocities [m/s] and which of them are fixed, of the vertices of a mesh."""
+    x = _placed(mesh.vertices, *place)
+    v = _velocities(mesh, material, x, place, velocity, angular_velocity)
+    return x, v, _mask(fixed, len(x), isinstance(material, Rigid), angular_velocity)
 
 
 def _placed(points: np.ndarray, position, rotation) -> np.ndarray:

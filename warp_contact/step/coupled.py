@@ -52,13 +52,20 @@ def add_parts(model: Model, y: wp.array, work: Work, moves: wp.array) -> None:
     _add(model, y, y, work)
 
 
-def sweep_all(model: Model, v: wp.array, work: Work, look: int, extrapolation: float) -> None:
+def sweep_all(
+    model: Model,
+    v: wp.array,
+    work: Work,
+    look: int,
+    extrapolation: float,
+    tolerance: float = TOLERANCE,
+) -> None:
     """Change ``v`` by normal impulses and friction until no contact approaches."""
     w, c = work.implicit, work.contacts
     inputs = [c.n, c.record, c.constraint, c.impulse, v]
     launch_over(kernels.find_counted, work.capacity.contacts, inputs=inputs, outputs=[w.counted])
     limits = Limits()
-    limits.extrapolation, limits.tolerance, limits.sweeps = extrapolation, TOLERANCE, SWEEPS
+    limits.extrapolation, limits.tolerance, limits.sweeps = extrapolation, tolerance, SWEEPS
     _repeat(model, v, work, look, _solve_contacts, limits)
     _record(model, work)
     if work.ties:

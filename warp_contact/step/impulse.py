@@ -10,7 +10,7 @@ from warp_contact.data.state import State
 from warp_contact.data.switches import on
 from warp_contact.data.warm_start import forget as forget_last
 from warp_contact.data.work import Work
-from warp_contact.kernels.impulse import constraint, pair_impulses
+from warp_contact.kernels.impulse import constraint, pair_impulses, strike
 from warp_contact.kernels.impulse import impulse as kernels
 from warp_contact.kernels.lengths import IMPULSE_TOLERANCE
 from warp_contact.kernels.worlds import FIRST_LOOK, NO_LOOK
@@ -73,6 +73,10 @@ def exchange(model: Model, v: wp.array, work: Work, look: int = NO_LOOK) -> None
 def solve_half_step(model: Model, state: State, work: Work) -> None:
     """As ``solve`` for half a step, of which nothing is kept for the next one."""
     begin(model, state.x, work)
+    if work.rebound:
+        _find_strikes(model, work)
+        inputs, outputs = [work.contacts.n, work.rebound.strike], [work.contacts.constraint]
+        launch_over(strike.leave_open, work.capacity.contacts, inputs=inputs, outputs=outputs)
     share = 1.0 if work.implicit else 0.5  # implicit steps keep forces
     warm_start.recall_edges(work, share)
     warm_start.recall_vertices(work, share)
@@ -112,6 +116,7 @@ def _sweep_all(model: Model, v: wp.array, work: Work, look: int) -> None:
 
 def _solve_from_last(model: Model, state: State, work: Work) -> None:
     begin(model, state.x, work)
+    _find_strikes(model, work)
     if on("warm start"):
         warm_start.recall_edges(work)
         warm_start.recall_vertices(work)
@@ -122,6 +127,7 @@ def _solve_from_last(model: Model, state: State, work: Work) -> None:
 def _add_edges(model: Model, state: State, work: Work) -> None:
     append_edge_contacts(model, state.x, work)
     _begin(model, state.x, work, work.contacts.n_vertex)
+    _find_strikes(model, work)
     warm_start.recall_edges(work, again=True)
 
 
@@ -137,6 +143,18 @@ def _begin(model: Model, x0: wp.array, work: Work, first: wp.array) -> None:
         inputs=[model.friction, first, c.n, c.record, c.graph, work.mobility, work.dt, x0],
         outputs=[c.constraint, c.impulse],
     )
+
+
+def _find_strikes(model: Model, work: Work) -> None:
+    """Set which contacts strike if they meet in this step, where bodies have restitution."""
+    r, c = work.rebound, work.contacts
+    if r:
+        launch_over(
+            strike.find_strikes,
+            work.capacity.contacts,
+            inputs=[model.restitution, model.g, work.dt, c.n, c.record, r.before, r.free],
+            outputs=[c.constraint, r.strike],
+        )
 
 
 def _sweep(model: Model, v: wp.array, work: Work) -> None:

@@ -6,17 +6,21 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work
 from warp_contact.kernels.motion import motion
-from warp_contact.step import implicit, ties
+from warp_contact.step import implicit, rebound, ties
 from warp_contact.step.damping import kick_damped
 from warp_contact.step.forces import internal_forces
 
 
 def predict(model: Model, state: State, work: Work, damping_stages: int) -> None:
     """Let forces, weight and damping act on ``state.v`` for a step; set ``work.x`` = x + h v."""
+    if work.rebound:
+        wp.copy(work.rebound.before, state.v)
     kick(model, state, work, work.awake, damping_stages)
     if work.ties:
         ties.hold(model, state, work)
         implicit.drift(model, state, work, work.x)
+    if work.rebound:
+        wp.copy(work.rebound.free, state.v)
 
 
 def kick(model: Model, state: State, work: Work, awake: Awake, damping_stages: int = 0) -> None:
@@ -64,10 +68,15 @@ def finish(model: Model, state: State, work: Work, apart: bool = False) -> None:
     if work.ties:
         ties.hold(model, state, work)  # what contacts have moved
         ties.make_up(model, state, work, apart)
+    bounces = work.rebound and not apart
+    if bounces:
+        rebound.weigh(state.v, work)
     if work.implicit:
         implicit.drift(model, state, work, state.x, turned=True)
     else:
         drift(model, state, work, state.x)
+    if bounces:
+        rebound.part(model, state, work)
     if work.ties:
         ties.record(model, state.x, work)
 

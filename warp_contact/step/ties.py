@@ -24,7 +24,7 @@ def begin(x: wp.array, work: Work) -> None:
     """Begin a step of ``work.dt`` at ``x``, or a part of one; where mobilities are those there."""
     t, d = work.ties, work.implicit.bodies
     wp.launch(matrix.begin_ties, t.n, inputs=[work.dt, x, d], outputs=[t.ties])
-    _find_matrix(x, work)
+    find_matrix(x, work)
 
 
 def begin_closure(x: wp.array, work: Work) -> None:
@@ -32,7 +32,7 @@ def begin_closure(x: wp.array, work: Work) -> None:
 
     Where ties say twice what they say, those of another place could not take back what they add.
     """
-    _find_matrix(x, work)
+    find_matrix(x, work)
     find_rows(work)
 
 
@@ -134,7 +134,8 @@ def wake_attached(mobile: wp.array, awake: wp.array, again: wp.array, work: Work
     wp.launch(attachment.wake, t.n_attachment, inputs=inputs, outputs=outputs)
 
 
-def _find_matrix(x: wp.array, work: Work) -> None:
+def find_matrix(x: wp.array, work: Work) -> None:
+    """Let the matrix be that at ``x``, where the mobilities are now."""
     t = work.ties
     wp.launch(matrix.assemble, t.n, inputs=[x, work.implicit.bodies], outputs=[t.ties])
     wp.launch(matrix.factorise, t.n_cluster, inputs=[], outputs=[t.ties])

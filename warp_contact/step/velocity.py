@@ -39,6 +39,9 @@ def velocities_now(
         kick(model, now, work, work.awake)
         if work.ties:
             hold_still(model, now, work)
+        if work.rebound:
+            wp.copy(work.rebound.before, state.v)
+            wp.copy(work.rebound.free, now.v)
         broad_phase.refresh(model, state.x, work.x, work)
         if_any(work.broad_phase.any_pair, answer, model, now, work)
     return now.v

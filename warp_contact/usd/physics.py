@@ -17,7 +17,7 @@ def note(prim, name: str, kind, value) -> None:
 
 
 def add_scene(stage, scene) -> None:
-    """Gravity, and the friction of all that has none of its own."""
+    """Gravity, and the friction and restitution of all that has none of its own."""
     prim = UsdPhysics.Scene.Define(stage, "/World/physics")
     g = np.array(scene.gravity)
     size = float(np.linalg.norm(g))
@@ -25,6 +25,8 @@ def add_scene(stage, scene) -> None:
     prim.CreateGravityDirectionAttr(Gf.Vec3f(*down))
     prim.CreateGravityMagnitudeAttr(size)
     note(prim, "friction", Sdf.ValueTypeNames.Double, scene.friction)
+    if scene.restitution:
+        note(prim, "restitution", Sdf.ValueTypeNames.Double, scene.restitution)
 
 
 def add_frame(xform: UsdGeom.Xform, body, solid) -> None:
@@ -104,21 +106,26 @@ class Materials:
         """Of a stage that has a scope ``/World/Looks``."""
         self._stage, self._known = stage, {}
 
-    def bind(self, prim, friction: float, material=None) -> None:
-        """Give a prim a friction, and what else a material says."""
-        key = friction, repr(material)
+    def bind(self, prim, friction: float, restitution: float, material=None) -> None:
+        """Give a prim both coefficients, and what else a material says."""
+        key = friction, restitution, repr(material)
         if key not in self._known:
-            self._known[key] = self._define(f"physics_{len(self._known)}", friction, material)
+            given = friction, restitution, material
+            self._known[key] = self._define(f"physics_{len(self._known)}", *given)
         api = UsdShade.MaterialBindingAPI.Apply(prim.GetPrim())
         api.Bind(self._known[key], materialPurpose="physics")
 
-    def _define(self, name: str, friction: float, material) -> UsdShade.Material:
+    def _define(
+        self, name: str, friction: float, restitution: float, material
+    ) -> UsdShade.Material:
         types = Sdf.ValueTypeNames
         made = UsdShade.Material.Define(self._stage, f"/World/Looks/{name}")
         prim = made.GetPrim()
         api = UsdPhysics.MaterialAPI.Apply(prim)
         api.CreateStaticFrictionAttr(friction)
         api.CreateDynamicFrictionAttr(friction)
+        if restitution:
+            api.CreateRestitutionAttr(restitution)
         if material is None:
             return made
         note(prim, "model", types.String, type(material).__name__)

@@ -131,7 +131,8 @@ def prim_name(label: str, taken: set[str]) -> str:
 
 def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Layer:
     """The layer of everything that does not change; the same at any time of a run."""
-    model, friction = sim.model, frictions(sim.scene)
+    model = sim.model
+    rubs = list(zip(*map(sim.scene.coefficients, ("friction", "restitution")), strict=True))
     x = np.concatenate([body.x for body in sim.scene.bodies]).astype(np.float32)
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
@@ -156,21 +157,15 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
         if tets:
             mesh = add_tets(stage, part, model, local)
             add_body(xform, mesh, body, part.is_rigid)
-            physics.bind(mesh, friction[part.index], body.material)
+            physics.bind(mesh, *rubs[part.index], body.material)
     taken = {Sdf.Path(part.path).name for part in parts} | {*TAKEN}
-    planes = zip(model.plane_n.numpy(), model.plane_h.numpy(), friction[len(parts) :], strict=True)
-    for n, h, mu in planes:
+    planes = zip(model.plane_n.numpy(), model.plane_h.numpy(), rubs[len(parts) :], strict=True)
+    for n, h, both in planes:
         path = f"/World/{prim_name('ground', taken)}"
-        physics.bind(add_plane(stage, path, n, float(h), x, look), mu)
+        physics.bind(add_plane(stage, path, n, float(h), x, look), *both)
     if view is not None:
         add_camera(stage, *view)
     return layer
-
-
-def frictions(scene) -> list[float]:
-    """Coulomb coefficient of each body, then of each half-space."""
-    own = [*(body.friction for body in scene.bodies), *scene.plane_friction]
-    return [scene.friction if mu is None else mu for mu in own]
 
 
 def contact_look(stage) -> UsdShade.Material:

@@ -4,6 +4,7 @@ import numpy as np
 
 from warp_contact import checks
 from warp_contact.data.model import Model
+from warp_contact.data.state import State
 from warp_contact.exclusive import exclusively
 from warp_contact.frame.stepper import Stepper
 from warp_contact.scene.attachments import Attachment
@@ -16,6 +17,7 @@ class Joined:
     frame: int
     device: object
     model: Model
+    state: State
     _stepper: Stepper
 
     def attachment_force(self, attachment: Attachment | str) -> np.ndarray:
@@ -28,6 +30,52 @@ class Joined:
         with exclusively(self.device):
             impulse = self._stepper.work.ties.attachments.impulse.numpy()[which]
         return impulse * self.fps if self.frame else np.zeros(3)
+
+    def set_motor(self, attachment: Attachment | str, velocity: float, limit: float) -> None:
+        """Let a motor lead the first body of a hinge or a slider, from the next frame on.
+
+        It leads to a velocity against the other body along the axis, or about it, as fast as its
+        force allows, and keeps it. The other body gets the opposite. Bodies of its world wake.
+
+        Args:
+            attachment: a hinge or a slider, or its label
+            velocity: along the axis [m/s], of a hinge about it [rad/s]
+            limit: of its force [N], of a hinge of its torque [N m]; 0 switches it off
+
+        Raises:
+            ValueError: there is no such attachment, it has no axis, or a number is out of range
+        """
+        which = self._attachment(attachment)
+        ties = self.model.ties
+        if ties.kind[which] not in ("hinge", "slider"):
+            raise ValueError(
+                f"attachment '{ties.labels[which]}' is a {ties.kind[which]}: a motor "
+                "drives a hinge or a slider"
+            )
+        velocity = checks.number(velocity, "velocity", -checks.FASTEST, checks.FASTEST)
+        limit = checks.number(limit, "limit", least=0.0)
+        with exclusively(self.device):
+            work = self._stepper.work
+            motors = work.ties.motors
+            motors.speed[which : which + 1].fill_(velocity)
+            motors.limit[which : which + 1].fill_(limit)
+            work.ties.driven = bool(motors.limit.numpy().any())
+            self._expect(which, velocity if limit else 0.0)
+            self._wake_world_of(which)
+
+    def motor_force(self, attachment: Attachment | str) -> float:
+        """Mean force [N] of a motor in the last frame along its axis, of a hinge torque [N m].
+
+        On the first body; ``attachment_force`` does not count it.
+
+        Raises:
+            ValueError: there is no such attachment
+        """
+        which = self._attachment(attachment)
+        with exclusively(self.device):
+            ties = self._stepper.work.ties
+            impulse = float(ties.motors.sum.numpy()[which])
+        return impulse * self.fps if self.frame and ties.driven else 0.0
 
     def is_attached(self, attachment: Attachment | str) -> bool:
         """Whether an attachment holds: it neither broke nor was let go.
@@ -50,10 +98,22 @@ class Joined:
             work = stepper.work
             work.ties.attachments.broken[which : which + 1].fill_(1)
             work.broad_phase.stale.fill_(1)
-            if stepper.sleeping:
-                world = stepper.worlds.of_body[self.model.ties.body[which, 0]]
-                woken = np.arange(stepper.worlds.n) == world
-                stepper.sleeping.wake_all(woken, work)
+            self._wake_world_of(which)
+
+    def _expect(self, which: int, velocity: float) -> None:
+        """Let steps be short enough for bodies that a motor may bring to a velocity."""
+        ties, x = self.model.ties, self.state.x.numpy()
+        bodies = [b for b in ties.body[which] if b >= 0]
+        own = np.isin(self.model.vert_body.numpy(), bodies)
+        reach = np.linalg.norm(np.ptp(x[own], axis=0)) if ties.kind[which] == "hinge" else 1.0
+        self._stepper.wrench.driven[bodies] = abs(velocity) * reach
+
+    def _wake_world_of(self, which: int) -> None:
+        stepper = self._stepper
+        if stepper.sleeping:
+            world = stepper.worlds.of_body[self.model.ties.body[which, 0]]
+            woken = np.arange(stepper.worlds.n) == world
+            stepper.sleeping.wake_all(woken, stepper.work)
 
     def _attachment(self, attachment: Attachment | str) -> int:
         labels = self.model.ties.labels if self.model.ties else ()

@@ -97,15 +97,9 @@ def find_changes(
     ties.pull[t] = r
 
 
-@wp.kernel
-def solve(
-    # in
-    keeps: bool,  # whether the impulses are those of the step
-    # in, out
-    ties: Ties,
-):
-    """One thread per cluster: what each tie adds, in place of r."""
-    c = wp.tid()
+@wp.func
+def substitute(c: int, ties: Ties):
+    """K^-1 r in place of r in the pulls of cluster c."""
     first = ties.first[c]
     n = ties.first[c + 1] - first
     for i in range(n):
@@ -119,11 +113,24 @@ def solve(
         s = ties.pull[first + i]
         for j in range(i + 1, n):
             s -= wp.transpose(ties.matrix[ties.block[c] + j * n + i]) * ties.pull[first + j]
-        s = wp.transpose(ties.matrix[ties.block[c] + i * n + i]) * s
-        ties.pull[first + i] = s
-        ties.since[first + i] = ties.since[first + i] + s
+        ties.pull[first + i] = wp.transpose(ties.matrix[ties.block[c] + i * n + i]) * s
+
+
+@wp.kernel
+def solve(
+    # in
+    keeps: bool,  # whether the impulses are those of the step
+    # in, out
+    ties: Ties,
+):
+    """One thread per cluster: what each tie adds, in place of r."""
+    c = wp.tid()
+    substitute(c, ties)
+    for t in range(ties.first[c], ties.first[c + 1]):
+        s = ties.pull[t]
+        ties.since[t] = ties.since[t] + s
         if keeps:
-            ties.held[first + i] = ties.held[first + i] + s
+            ties.held[t] = ties.held[t] + s
 
 
 @wp.kernel

@@ -55,7 +55,7 @@ def touching(overlap: float, upper=None) -> Scene:
 @pytest.mark.parametrize(
     "name",
     [*RESPONSES, "implicit", "rigid", "rigid penalty", "rigid predicted", "mixed", "rigid tied"]
-    + ["rigid bouncing"],
+    + ["rigid bouncing", "rigid driven"],
 )
 def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap):
     captured = []
@@ -82,8 +82,12 @@ def test_nothing_in_a_capture_allocates_or_reads_back(monkeypatch, name, overlap
         scene.attach(1, kind="ball", at=(0.03, 0.0, 0.2), breaking_force=1e6)
         scene.attach(0, kind="weld", vertices=range(9), stiffness=10.0)
     scene.restitution = 0.5 if name == "rigid bouncing" else 0.0
+    if name == "rigid driven":
+        scene.attach(1, kind="hinge", at=(0.03, 0.0, 0.2), axis=(1.0, 0.0, 0.0), label="turned")
     integrator = "explicit" if name in RESPONSES else "implicit"
     sim = Simulation(scene, RESPONSES.get(name.removeprefix("rigid ")), integrator=integrator)
+    if name == "rigid driven":
+        sim.set_motor("turned", 1.0, 1.0)
     if scene.restitution:
         sim.set_velocity(1, (0.0, 0.0, -1.0))
     assert any(sim.contact_fields()["pressure"].any() for _ in sim.frames(2))

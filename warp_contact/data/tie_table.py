@@ -13,6 +13,7 @@ class TieTable:
         labels: of the attachments
         body: both bodies of each attachment, -1 for the world, shape (n_attachment, 2)
         limit: force that breaks it [N], shape (n_attachment,)
+        kind: of each attachment, as it was asked for
         attachment: whose each tie is, shape (n_tie,)
         cluster: its cluster, shape (n_tie,)
         first: first tie of each cluster, shape (n_cluster + 1,)
@@ -25,6 +26,7 @@ class TieTable:
     labels: tuple[str, ...]
     body: np.ndarray
     limit: np.ndarray
+    kind: tuple[str, ...]
     attachment: np.ndarray
     cluster: np.ndarray
     first: np.ndarray

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from warp_contact.data import motors
 from warp_contact.data.model import Model
 from warp_contact.data.tie_table import TieTable
 from warp_contact.kernels.implicit.bodies import RigidMotion
 from warp_contact.kernels.ties.attachment import Attachments, Partners
+from warp_contact.kernels.ties.motor import Motors
 from warp_contact.kernels.ties.rows import Rows
 from warp_contact.kernels.ties.tie import Tied, Ties, vec8, vec8i
 
@@ -26,6 +28,8 @@ class TieWork:
         attachments: forces and limits
         partners: which bodies each body is attached to
         rows: row sums of contacts on them
+        motors: what drives them
+        driven: whether a motor drives any
         attached: 1 for a body that is attached to anything, shape (n_body,)
         no_edges: an empty array
     """
@@ -39,30 +43,36 @@ class TieWork:
     attachments: Attachments
     partners: Partners
     rows: Rows
+    motors: Motors
     attached: wp.array[int]
     no_edges: wp.array[wp.vec4i]
+    driven: bool = False
 
-    def copied(self) -> tuple[wp.array, wp.array]:
-        """What a frame changes: what is broken, and impulses [N s]; in arrays of their own."""
-        return wp.clone(self.attachments.broken), wp.clone(self.attachments.impulse)
+    def copied(self) -> dict[str, wp.array]:
+        """What a frame changes: what is broken, impulses [N s], motors; in arrays of their own."""
+        return {name: wp.clone(array) for name, array in self._kept().items()}
 
-    def copy(self, kept: tuple[wp.array, wp.array]) -> None:
+    def copy(self, kept: dict[str, wp.array]) -> None:
         """Put back what was ``copied``."""
-        wp.copy(self.attachments.broken, kept[0])
-        wp.copy(self.attachments.impulse, kept[1])
+        for name, array in self._kept().items():
+            wp.copy(array, kept[name])
 
     def values(self) -> dict[str, np.ndarray]:
         """What a checkpoint needs."""
-        of = self.attachments
-        return {"broken": of.broken.numpy(), "impulse": of.impulse.numpy()}
+        return {name: array.numpy() for name, array in self._kept().items()}
 
-    def restore(self, broken: np.ndarray, impulse: np.ndarray) -> None:
+    def restore(self, **values: np.ndarray) -> None:
         """Take over what ``values`` gave."""
-        self.attachments.broken.assign(broken)
-        self.attachments.impulse.assign(impulse)
+        for name, array in self._kept().items():
+            array.assign(values[name])
+        self.driven = bool(values["limit"].any())
+
+    def _kept(self) -> dict[str, wp.array]:
+        of = self.attachments
+        return {"broken": of.broken, "impulse": of.impulse} | motors.arrays(self.motors)
 
     def mend(self, which: np.ndarray) -> None:
-        """Let attachments, a mask, hold as at the start, and forget their forces."""
+        """Let attachments, a mask, hold as at the start, without motors, and forget forces."""
         values = self.values()
         for name in values:
             values[name] = values[name].copy()
@@ -89,6 +99,7 @@ def allocate(model: Model, lumped: np.ndarray) -> TieWork | None:
         attachments=attachments,
         partners=_partners(model, table),
         rows=_rows(model, table, lumped),
+        motors=motors.allocate(table, model.n_body),
         attached=wp.array(np.isin(np.arange(model.n_body), table.body), dtype=int),
         no_edges=wp.zeros(0, dtype=wp.vec4i),
     )

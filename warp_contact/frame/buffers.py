@@ -49,7 +49,7 @@ class Buffers:
         inv_mass = model.inv_mass.numpy()
         mobile = float(model.mass.numpy()[inv_mass > 0.0].sum(dtype=np.float64))
         self.unit = IMPULSE_UNIT * (mobile if mobile > 0.0 else 1.0)
-        self._graphs: dict[tuple[int, bool], wp.Graph] = {}
+        self._graphs: dict[tuple[int, bool, bool], wp.Graph] = {}
         pairs = max(Capacity.pairs, NEIGHBOURS * model.n_body)
         self.work: Work = self._allocate(Capacity(pairs=pairs))
 
@@ -111,7 +111,8 @@ class Buffers:
 
     def graph(self, damping_stages: int, overlapping: bool) -> wp.Graph:
         """The captured steps of a frame, with so many stages of damping."""
-        key = damping_stages, overlapping
+        driven = bool(self.work.ties and self.work.ties.driven)
+        key = damping_stages, overlapping, driven
         if key not in self._graphs:
             one = step_of(self.response, overlapping)
             with wp.ScopedCapture() as capture:

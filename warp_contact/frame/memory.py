@@ -33,7 +33,7 @@ def restore(stepper: Stepper, values: dict[str, np.ndarray]) -> None:
     warm_start.restore(stepper.work.warm, checkpoint.group(values, "warm"))
     damping.restore(stepper.work.damping, checkpoint.group(values, "damping"))
     wrench = checkpoint.group(values, "wrench")
-    stepper.wrench.restore(wrench["last"], wrench["next"])
+    stepper.wrench.restore(wrench["last"], wrench["next"], wrench["driven"])
     if stepper.work.ties:
         stepper.work.ties.restore(**checkpoint.group(values, "ties"))
     if stepper.sleeping:

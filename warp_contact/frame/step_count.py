@@ -79,7 +79,7 @@ class StepCount:
             raise SimulationError(f"frame {frame}: {tet} is too flat: no step is stable")
         if self.wanted:
             return np.full(self._worlds.n, self.wanted)
-        pushed = self._worlds.most(self.wrench.accelerations()) / self.fps
+        pushed = self._worlds.most(self.wrench.gains(1.0 / self.fps))
         omega, speed = self._with_response(omega), self._speed(state) + pushed
         overlaps = (last.overlapping > 0) | self._leaves
         thickness, edge = self._sizes
@@ -159,8 +159,9 @@ class StepCount:
         most, least, fastest = self._extremes(v)
         box = np.linalg.norm(np.maximum(most - mean, mean - least), axis=1)
         ball = fastest + np.linalg.norm(mean, axis=1)
-        gained = float(np.linalg.norm(self._model.gravity)) + self.wrench.accelerations()
-        own = self._worlds.most(gained)[self._worlds.of_body] / self.fps
+        gained = float(np.linalg.norm(self._model.gravity)) / self.fps
+        gained = gained + self.wrench.gains(1.0 / self.fps)
+        own = self._worlds.most(gained)[self._worlds.of_body]
         speed = np.minimum(box, ball) + spread + own
         return self._worlds.most(speed / self._reach)
 

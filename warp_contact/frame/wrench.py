@@ -15,6 +15,9 @@ class Wrench:
 
     Velocities are half a step behind positions. A force that changes between two frames acts for
     half a step at its old value and half a step at its new one.
+
+    Attributes:
+        driven: speed up to which a motor may bring each body [m/s], shape (n_body,)
     """
 
     def __init__(self, shapes: Shapes | None, model: Model):
@@ -26,6 +29,7 @@ class Wrench:
         self._fixed, self._held = moving == 0, moving < np.bincount(self._of_vert, minlength=n)
         self._last, self._next = np.zeros((2, 2, n, 3))
         self._kept = self._last, self._next
+        self.driven = np.zeros(n)
 
     def add(self, body: int, force: np.ndarray, torque: np.ndarray) -> None:
         """Let a force [N] and a torque [N m] act on body ``body`` in the next frame.
@@ -48,7 +52,11 @@ class Wrench:
             self._assign(self._last)
         shift_velocities(model, state, work, work.awake, lag)
 
-    def accelerations(self) -> np.ndarray:
+    def gains(self, duration: float) -> np.ndarray:
+        """Speed [m/s] that each body gains in a frame of ``duration`` [s] at most, (n_body,)."""
+        return duration * self._accelerations() + self.driven
+
+    def _accelerations(self) -> np.ndarray:
         """How fast what acts in the next frame makes each body [m/s^2] at most, (n_body,)."""
         force, torque = np.linalg.norm(self._next, axis=2)
         if not self._shapes or not self._next.any():
@@ -82,15 +90,15 @@ class Wrench:
 
     def clear(self) -> None:
         """Nothing acts, as before the first frame."""
-        self.restore(*np.zeros((2, *self._last.shape)))
+        self.restore(*np.zeros((2, *self._last.shape)), np.zeros(len(self.driven)))
 
     def values(self) -> dict[str, np.ndarray]:
         """What a checkpoint needs."""
-        return {"last": self._last, "next": self._next}
+        return {"last": self._last, "next": self._next, "driven": self.driven}
 
-    def restore(self, last: np.ndarray, following: np.ndarray) -> None:
+    def restore(self, last: np.ndarray, following: np.ndarray, driven: np.ndarray) -> None:
         """Take over what ``values`` gave."""
-        self._last, self._next = last, following
+        self._last, self._next, self.driven = last, following, driven.copy()
         if self._shapes:
             self._assign(last)
 

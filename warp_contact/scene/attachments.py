@@ -143,6 +143,7 @@ def lay_out(attachments: Sequence[Attachment], bodies: Sequence[Body]) -> TieTab
         labels=tuple(a.label for a in attachments),
         body=np.array([(a.a.index, a.b.index if a.b else -1) for a in attachments]),
         limit=np.array([a.breaking_force or np.inf for a in attachments]),
+        kind=tuple(a.kind for a in attachments),
         attachment=whose,
         cluster=cluster,
         first=np.concatenate([[0], np.cumsum(number)]),

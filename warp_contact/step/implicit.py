@@ -25,7 +25,7 @@ def kick(model: Model, state: State, work: Work) -> None:
         solve_present(model, state.x, work)
     else:
         place(model, state.x, w)
-        _rigid_part(model, w.dv, state.x, w)  # of nothing
+        rigid_part(model, w.dv, state.x, w)  # of nothing
     inputs = [state.x, w.dv, model.g, work.dt, w.bodies, w.of]
     wp.launch(predict.kick, model.n_vert, inputs=inputs, outputs=[state.v])
     wp.copy(w.predicted, state.v)
@@ -49,7 +49,7 @@ def solve_present(model: Model, x: wp.array, work: Work) -> None:
     outputs = [w.iteration, w.p, w.running]
     wp.launch(solve.begin, model.n_body, inputs=inputs, outputs=outputs)
     while_any(w.running, _iterate, model, x, w)
-    _rigid_part(model, w.dv, x, w)
+    rigid_part(model, w.dv, x, w)
 
 
 def push(model: Model, state: State, work: Work, part: float) -> None:
@@ -63,7 +63,7 @@ def push(model: Model, state: State, work: Work, part: float) -> None:
 def drift(model: Model, state: State, work: Work, out: wp.array, turned: bool = False) -> None:
     """Set ``out`` to x after ``work.dt``; with ``turned``, ``state.v`` to the velocities there."""
     w = work.implicit
-    _rigid_part(model, state.v, state.x, w)
+    rigid_part(model, state.v, state.x, w)
     given = [work.dt, state.x]
     inputs = [*given, state.v, w.bodies, w.of]
     wp.launch(drifting.find_drift, model.n_body, inputs=inputs, outputs=[w.drift])
@@ -102,8 +102,8 @@ def answer(
     wp.launch(mobility.correct, n_body, inputs=[x, d, w.by, w.busy], outputs=[w.of, out])
 
 
-def _rigid_part(model: Model, y: wp.array, x: wp.array, w: ImplicitWork) -> None:
-    """Set ``of`` for velocities ``y``."""
+def rigid_part(model: Model, y: wp.array, x: wp.array, w: ImplicitWork) -> None:
+    """Set ``of`` for velocities ``y`` at ``x``."""
     wp.launch(mobility.rigid_part, model.n_body, inputs=[y, x, w.bodies], outputs=[w.of])
 
 

@@ -6,7 +6,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work
 from warp_contact.kernels.motion import motion
-from warp_contact.step import implicit, rebound, ties
+from warp_contact.step import implicit, motors, rebound, ties
 from warp_contact.step.damping import kick_damped
 from warp_contact.step.forces import internal_forces
 
@@ -17,7 +17,8 @@ def predict(model: Model, state: State, work: Work, damping_stages: int) -> None
         wp.copy(work.rebound.before, state.v)
     kick(model, state, work, work.awake, damping_stages)
     if work.ties:
-        ties.hold(model, state, work)
+        hold = motors.drive if work.ties.driven else ties.hold
+        hold(model, state, work)
         implicit.drift(model, state, work, work.x)
     if work.rebound:
         wp.copy(work.rebound.free, state.v)
@@ -68,6 +69,8 @@ def finish(model: Model, state: State, work: Work, apart: bool = False) -> None:
     if work.ties:
         ties.hold(model, state, work)  # what contacts have moved
         ties.make_up(model, state, work, apart)
+        if work.ties.driven:
+            motors.finish(model, state, work)
     bounces = work.rebound and not apart
     if bounces:
         rebound.weigh(state.v, work)

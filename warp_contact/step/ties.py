@@ -18,6 +18,8 @@ def begin_frame(work: Work) -> None:
     t = work.ties
     inputs = [work.awake.bodies]
     wp.launch(attachment.begin_frame, t.n_attachment, inputs=inputs, outputs=[t.attachments])
+    if t.driven:
+        t.motors.sum.zero_()
 
 
 def begin(x: wp.array, work: Work) -> None:

@@ -15,7 +15,7 @@ from warp_contact.data.launch import if_any
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work
-from warp_contact.step import broad_phase, impulse, narrow_phase
+from warp_contact.step import broad_phase, impulse, motors, narrow_phase
 from warp_contact.step.detection import detect
 from warp_contact.step.motion import kick
 from warp_contact.step.other_responses import push_half_step
@@ -37,6 +37,8 @@ def velocities_now(
         work.dt.assign((0.5 * dt).astype(np.float32))
         work.overflow.all.zero_()
         kick(model, now, work, work.awake)
+        if work.ties and work.ties.driven:
+            motors.again(model, now, work)
         if work.ties:
             hold_still(model, now, work)
         if work.rebound:

@@ -86,6 +86,33 @@ def test_contacts_add_up_to_the_force_of_their_pair(device, kind):
     assert (np.linalg.norm(c.friction_force, axis=1) <= 0.6 * c.normal_force * (1.0 + 1e-5)).all()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_contacts_add_up_also_where_the_closure_looked_for_others(device, kind):
+    scene = wc.Scene(friction=0.3)
+    scene.add_plane((0.0, 0.0, 1.0))
+    soft = wc.NeoHookean(1e5, 0.3, DENSITY, 2e-3)
+    for k, (x, y) in enumerate([(0.0, 0.0), (0.01, 0.013)]):
+        scene.add_body(wc.box(EDGE, 2), soft, (x, y, (k + 0.5) * EDGE + 1e-4 * k), label=f"b{k}")
+    fps = 240 if kind == "implicit" else 3000
+    sim = wc.Simulation(scene, fps=fps, substeps=1, integrator=kind, device=str(device))
+    looks = 0
+    for _ in sim.frames(80):
+        looks += int(sim._stepper.work.contacts.kept.n.numpy()[0] >= 0)
+        each, arrays = sim.contacts(), sim.contact_arrays()
+        n = int(arrays.n.numpy()[0])
+        total = each.normal_force[:, None] * each.normal + each.friction_force
+        same = arrays.normal_force.numpy()[:n, None] * arrays.normal.numpy()[:n]
+        same += arrays.friction_force.numpy()[:n]
+        want = sim.forces()
+        for pair, of in (("b0", "plane0"), (0, 2)), (("b0", "b1"), (0, 1)):
+            sign = np.where((each.bodies == of).all(axis=1), 1.0, 0.0)
+            sign -= (each.bodies == of[::-1]).all(axis=1)
+            force = want[pair].total if pair in want else np.zeros(3)
+            for got in (total, same):  # a frame is a step; sums in float32 of some weights
+                np.testing.assert_allclose(sign @ got, force, atol=1e-4 * WEIGHT)
+    assert looks > 0
+
+
 def test_contacts_of_two_bodies_have_two_sides(device):
     scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
     scene.add_body(wc.box(EDGE, 2), RUBBER)

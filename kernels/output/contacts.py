@@ -34,19 +34,47 @@ class ContactArrays:
 
 
 @wp.kernel
+def keep_contacts(
+    # in
+    threads: int,
+    n_contact: wp.array[int],  # (1,)
+    contact: wp.array[Contact],  # (capacity,)
+    impulse: wp.array[Impulse],  # (capacity,)
+    # out
+    n_kept: wp.array[int],  # (1,)
+    kept: wp.array[Contact],  # (capacity,)
+    kept_impulse: wp.array[Impulse],  # (capacity,)
+):
+    """For each contact: keep it, with its impulses, before others take its place."""
+    if wp.tid() == 0:
+        n_kept[0] = n_contact[0]
+    for c in range(wp.tid(), n_contact[0], threads):
+        kept[c] = contact[c]
+        kept_impulse[c] = impulse[c]
+
+
+@wp.kernel
 def mark_contacts(
     # in
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
+    n_kept: wp.array[int],  # (1,) -1 where none are kept
+    kept: wp.array[Contact],  # (capacity,) in place of the others where some are
     # out
     made: wp.array[int],  # (capacity + 1,) 1 for a contact, else 0
 ):
     """One thread per place, and one behind them: whether it holds a contact."""
     c = wp.tid()
     found = int(0)
-    if c < n_contact[0]:
+    n = n_contact[0]
+    if n_kept[0] >= 0:
+        n = n_kept[0]
+    if c < n:
+        at = contact[c]
+        if n_kept[0] >= 0:
+            at = kept[c]
         for k in range(5):
-            if contact[c].coef[k] != 0.0:
+            if at.coef[k] != 0.0:
                 found = 1
     made[c] = found
 
@@ -56,6 +84,9 @@ def write_contacts(
     # in
     contact: wp.array[Contact],  # (capacity,)
     impulse: wp.array[Impulse],  # (capacity,)
+    n_kept: wp.array[int],  # (1,) -1 where none are kept
+    kept: wp.array[Contact],  # (capacity,) in place of the others where some are
+    kept_impulse: wp.array[Impulse],  # (capacity,)
     before: wp.array[int],  # (capacity + 1,) contacts before each place
     dt: wp.array[float],  # (n_vert,) [s]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -72,6 +103,9 @@ def write_contacts(
         return
     at = contact[c]
     p = impulse[c]
+    if n_kept[0] >= 0:
+        at = kept[c]
+        p = kept_impulse[c]
     h = dt[at.vert[0]]
     u = relative_velocity(at, v)
     to.bodies[k] = at.pair

@@ -10,6 +10,21 @@ from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
 
 
 @dataclass
+class KeptContacts:
+    """Contacts that exchanged impulses in the last step, where a later look found others.
+
+    Attributes:
+        n: number of contacts, -1 where no later look did, shape (1,)
+        record: of each, shape (capacity,)
+        impulse: of the step, shape (capacity,)
+    """
+
+    n: wp.array[int]
+    record: wp.array[Contact]
+    impulse: wp.array[Impulse]
+
+
+@dataclass
 class Contacts:
     """Contacts of vertices first, then those of edges.
 
@@ -23,6 +38,7 @@ class Contacts:
         constraint: the constants of each in this step, shape (capacity,)
         impulse: of the step, shape (capacity,)
         part: what a sweep adds at each vertex of each contact [N s], shape (5 capacity,)
+        kept: those to be read after the step
     """
 
     n: wp.array[int]
@@ -32,6 +48,7 @@ class Contacts:
     constraint: wp.array[Constraint]
     impulse: wp.array[Impulse]
     part: wp.array[wp.vec3]
+    kept: KeptContacts
 
 
 def allocate(n_vert: int, capacity: int, n_vertex: wp.array[int]) -> Contacts:
@@ -49,6 +66,11 @@ def allocate(n_vert: int, capacity: int, n_vertex: wp.array[int]) -> Contacts:
         constraint=wp.zeros(capacity, dtype=Constraint),
         impulse=wp.zeros(capacity, dtype=Impulse),
         part=wp.zeros(5 * capacity, dtype=wp.vec3),
+        kept=KeptContacts(
+            n=wp.full(1, -1, dtype=int),
+            record=wp.zeros(capacity, dtype=Contact),
+            impulse=wp.zeros(capacity, dtype=Impulse),
+        ),
     )
 
 

@@ -149,4 +149,5 @@ def forget(work: Work) -> None:
     damping.forget(work.damping)
     contact_forces.clear(work.forces)
     work.contacts.n.zero_()
+    work.contacts.kept.n.fill_(-1)
     work.broad_phase.stale.fill_(1)

@@ -169,6 +169,7 @@ class Sleeping:
         state.v.zero_()
         self.awake.inv_mass.zero_()
         work.contacts.n.zero_()
+        work.contacts.kept.n.fill_(-1)
         work.forces.unsolved.zero_()
 
     def begin_frame(self, state: State, work: Work) -> None:

@@ -41,14 +41,15 @@ class ContactRows:
         wp.launch(
             contacts.mark_contacts,
             dim=self.capacity + 1,
-            inputs=[c.n, c.record],
+            inputs=[c.n, c.record, c.kept.n, c.kept.record],
             outputs=[self._before],
         )
         scan(self._before, self._scratch, inclusive=False)
         wp.launch(
             contacts.write_contacts,
             dim=self.capacity,
-            inputs=[c.record, c.impulse, self._before, self._dt, state.x, state.v],
+            inputs=[c.record, c.impulse, c.kept.n, c.kept.record, c.kept.impulse]
+            + [self._before, self._dt, state.x, state.v],
             outputs=[self.arrays],
         )
         return self.arrays

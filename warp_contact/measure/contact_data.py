@@ -65,8 +65,12 @@ class Contacts:
 
 def contacts(state: State, work: Work, dt: np.ndarray) -> Contacts:
     """Those of the last step at the present positions; ``dt`` are the steps [s], (n_vert,)."""
-    n = int(work.contacts.n.numpy()[0])
-    record, impulse = (a.numpy()[:n] for a in (work.contacts.record, work.contacts.impulse))
+    of, n = work.contacts, int(work.contacts.kept.n.numpy()[0])
+    if n < 0:
+        n = int(of.n.numpy()[0])
+    else:
+        of = of.kept
+    record, impulse = (a.numpy()[:n] for a in (of.record, of.impulse))
     made = (record["coef"] != 0.0).any(axis=1)
     record, impulse = record[made], impulse[made]
     vert, coef, normal = record["vert"], record["coef"].astype(np.float64), record["normal"]

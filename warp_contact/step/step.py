@@ -24,6 +24,7 @@ def step(model: Model, state: State, work: Work, damping_stages: int, iterations
     where bodies were apart in all worlds.
     """
     fly = partial(in_free_flight, model, state, work)
+    work.contacts.kept.n.fill_(-1)
     predict(model, state, work, damping_stages)  # 1
     broad_phase.refresh(model, state.x, work.x, work)  # 2
     if_any(work.broad_phase.any_pair, in_contact, model, state, work, iterations, otherwise=fly)

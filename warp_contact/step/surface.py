@@ -13,6 +13,7 @@ from warp_contact.data.state import State
 from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.lengths import OLD_OVERLAP
+from warp_contact.kernels.output.contacts import keep_contacts
 from warp_contact.kernels.surface import closure
 from warp_contact.kernels.worlds import FIRST_LOOK, SECOND_LOOK
 from warp_contact.step import coupled, residual, search, sweeps
@@ -43,9 +44,17 @@ def _close_gaps(model: Model, state: State, work: Work, iterations: int) -> None
     # Vertices may now be at other triangles than before, and edges may cross that the narrow phase
     # could not see.
     if on("second look"):
+        _keep_contacts(work)
         detect(model, state.x, state.x, work)
     residual.find_gaps_left(model, state.x, work)
     if_any(work.surface.any_open, close, model, state, work, SECOND_LOOK, searched)
+
+
+def _keep_contacts(work: Work) -> None:
+    """Let the contacts with the impulses of the step be read after it, in place of others."""
+    c = work.contacts
+    outputs = [c.kept.n, c.kept.record, c.kept.impulse]
+    launch_over(keep_contacts, work.capacity.contacts, [c.n, c.record, c.impulse], outputs)
 
 
 def _search(model: Model, state: State, work: Work, iterations: int) -> None:

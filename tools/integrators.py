@@ -4,6 +4,7 @@
 
     case        ``blocks_E``: a block of 0.1 m and modulus E [Pa] falls by 1 mm onto another;
                 ``tool``: one of steel, 2e11 Pa, on foam; ``pile``: a tenth of the bowl;
+                ``shell``: a ball at 8 m/s on a shell of 1 mm that is held;
                 ``gripper``: 64 worlds of a ball between two fingers; the scenes of the paper
     integrator  that the row is of
     s_per_s     CPU time of the process per simulated time, frames after the first
@@ -90,6 +91,15 @@ def tool() -> wc.Scene:
     return scene
 
 
+def shell() -> wc.Scene:
+    """A soft ball that flies at a thin shell."""
+    scene = wc.Scene(friction=0.3, gravity=(0.0, 0.0, 0.0))
+    rubber = wc.NeoHookean(1e5, 0.4, 1000.0, 1e-3)
+    scene.add_body(wc.heightfield(np.zeros((7, 7)), 0.4, 1e-3), wc.Rigid(1000.0), fixed=True)
+    scene.add_body(wc.sphere(0.05, 147), rubber, (0.01, 0.02, 0.08), velocity=(1.0, 0.0, -8.0))
+    return scene
+
+
 def gripper() -> wc.Scene:
     """A ball on the floor between two fingers, in each of 64 worlds."""
     rubber = wc.NeoHookean(1e5, 0.4, 1000.0, 2e-3)
@@ -106,7 +116,8 @@ def gripper() -> wc.Scene:
 
 
 CASES = {f"blocks_1e{k}": partial(blocks, 10.0**k) for k in range(4, 13)}
-CASES |= {"tool": tool, "pile": lambda: scenes.load("bowl").build(fraction=0.1), "gripper": gripper}
+CASES |= {"tool": tool, "shell": shell, "gripper": gripper}
+CASES |= {"pile": lambda: scenes.load("bowl").build(fraction=0.1)}
 PAPER = "two_bodies", "squeezed_sphere", "cubes_on_membrane", "membrane_stack"
 CASES |= {name: scenes.load(name).build for name in PAPER}
 

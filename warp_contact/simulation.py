@@ -218,14 +218,16 @@ class Simulation(BetweenFrames, ContactData, Joined):
         The scene is not in it: build it anew, make a ``Simulation`` of it with the same settings,
         and ``load`` the file. Velocities given to fixed vertices are part of it.
         """
-        path = checks.path(path, "path")
+        checkpoint.write(checks.path(path, "path"), self._fingerprint(), self._values())
+
+    def _values(self) -> dict[str, np.ndarray]:
+        """What a checkpoint holds; on a CPU some are the arrays themselves, and not copies."""
         with exclusively(self.device):
             values = {"x": self.state.x.numpy(), "v": self.state.v.numpy()}
             values |= {"frame": np.array(self.frame)} | memory.values_of(self._stepper)
             of_meter, moves = self._meter.tunnelling.memory(), self._moves.values()
             values |= checkpoint.ungroup({"meter": of_meter, "moves": moves})
-            values |= checkpoint.ungroup({"surroundings": self._surroundings.values()})
-        checkpoint.write(path, self._fingerprint(), values)
+            return values | checkpoint.ungroup({"surroundings": self._surroundings.values()})
 
     def load(self, path: str | os.PathLike) -> None:
         """Continue from a checkpoint; until the next frame only bodies asleep have contact forces.
@@ -234,7 +236,10 @@ class Simulation(BetweenFrames, ContactData, Joined):
             OSError: it cannot be read
             ValueError: it is no checkpoint, or one of another scene or other settings
         """
-        values = checkpoint.read(checks.path(path, "path"), self._fingerprint())
+        self._continue(checkpoint.read(checks.path(path, "path"), self._fingerprint()))
+
+    def _continue(self, values: dict[str, np.ndarray]) -> None:
+        """Go back to what ``_values`` gave."""
         with exclusively(self.device):
             self.state.x.assign(values["x"])
             self.state.v.assign(values["v"])

@@ -28,10 +28,11 @@ class _Run:
         self.solver = SolverContactSurface(self.model, **settings)
         self.now, self.then = self.model.state(), self.model.state()
         self.seen = self.solver.observables(self.solver.supported_observables)
+        self.control = None
 
     def step(self, n: int = 1, dt: float = DT) -> None:
         for _ in range(n):
-            self.solver.step(self.now, self.then, None, None, dt, observables=self.seen)
+            self.solver.step(self.now, self.then, self.control, None, dt, observables=self.seen)
             self.now, self.then = self.then, self.now
 
     @property

@@ -73,41 +73,48 @@ def test_a_static_shape_holds_a_block(device, shape, add_block, run_of):
     assert run.force[:, 2].sum() > 0.0 and run.x[:, 2].min() > -0.01  # a ball dents it
 
 
-def _joint(builder):
-    ball = builder.add_link()
-    builder.add_shape_sphere(ball, radius=0.1)
-    builder.add_joint_revolute(-1, ball, label="hinge")
+def test_a_body_of_several_shapes_is_one_of_them_all(device, add_block, run_of):
+    builder = newton.ModelBuilder()
+    builder.add_ground_plane()
+    add_block(builder, (0.0, 0.0, 1e-4))
+    # A bridge over the block: a slab, which hangs over at one side, on two legs that it covers.
+    bridge = builder.add_body(xform=wp.transform(wp.vec3(0.05, 0.05, 0.2), STILL))
+    for x, z, half, height in ((0.02, 0.0, 0.17, 0.01), (-0.1, -0.1, 0.01, 0.1)):
+        place = wp.transform(wp.vec3(x, 0.0, z), STILL)
+        builder.add_shape_box(bridge, xform=place, hx=half, hy=0.05, hz=height)
+    place = wp.transform(wp.vec3(0.1, 0.0, -0.1), STILL)
+    builder.add_shape_cylinder(bridge, xform=place, radius=0.01, half_height=0.1)
+    run = run_of(builder, device)
+    layout = run.solver._layout
+    material = layout.scene.bodies[layout.solid[0].index].material
+    model = run.model
+    np.testing.assert_allclose(material.mass, model.body_mass.numpy()[0], rtol=1e-6)
+    np.testing.assert_allclose(material.centre, model.body_com.numpy()[0], atol=1e-7)
+    np.testing.assert_allclose(material.inertia, model.body_inertia.numpy()[0], rtol=1e-5)
+    run.step(60)
+    q = run.now.body_q.numpy()[0]
+    # It stands on its legs, level, and the block below touches nothing but the ground.
+    np.testing.assert_allclose(q[:3], [0.05, 0.05, 0.2], atol=1e-4)
+    np.testing.assert_allclose(q[3:], [0.0, 0.0, 0.0, 1.0], atol=2e-3)
+    forces = run.solver.simulation.forces()
+    (pair,) = [pair for pair in forces if "body 0 'body_0'" in pair]
+    weight = float(model.body_mass.numpy()[0]) * 9.81
+    assert pair[1] == "plane0"
+    np.testing.assert_allclose(forces[pair].total[2], weight, rtol=0.05)  # it still trembles
 
 
-def _two_shapes(builder):
-    builder.add_shape_box(add_ball(builder, (0.0, 0.0, 1.0), label="twin"), hx=0.1, hy=0.1, hz=0.1)
-
-
-def _materials(builder):
-    builder.tet_materials[-1] = (1e6, 1e6, 0.0)
-
-
-def _skin(builder):
-    builder.tri_materials[0] = (1.0, 0.0, 0.0, 0.0, 0.0)
-
-
-REFUSED = {
-    "hinge": _joint,
-    "'twin'.* has 2 shapes": _two_shapes,
-    "volume_0 has tets of several materials": _materials,
-    "CONE": lambda b: b.add_shape_cone(-1, radius=0.1, half_height=0.1),
-    "particles 27 belong to no tet": lambda b: b.add_particle(wp.vec3(), wp.vec3(), 1.0),
-    "1 springs": lambda b: b.add_spring(0, 1, 1.0, 1.0, 0.0),
-    "tri_materials": _skin,
-}
-
-
-@pytest.mark.parametrize("message", REFUSED)
-def test_what_cannot_be_simulated_is_refused_by_name(device, message, add_block):
+def test_shapes_side_by_side_are_joined_and_must_have_one_friction(device, add_block):
     builder = newton.ModelBuilder()
     add_block(builder, (0.0, 0.0, 0.0))
-    REFUSED[message](builder)
-    with pytest.raises(ValueError, match=message):
+    body = builder.add_body(xform=wp.transform(wp.vec3(5.0, 0.0, 0.0), STILL), label="pair")
+    for x in 0.1, 0.3:
+        place = wp.transform(wp.vec3(x, 0.0, 0.0), STILL)
+        builder.add_shape_box(body, xform=place, hx=0.1, hy=0.1, hz=0.1)
+    solver = SolverContactSurface(builder.finalize(device=device))  # no warning of seams
+    mesh = solver._layout.scene.bodies[1].mesh
+    assert mesh.n_pieces == 1 and mesh.volume == pytest.approx(0.016)
+    builder.shape_material_mu[-1] = 0.1
+    with pytest.raises(ValueError, match="'pair' has shapes with a mu of"):
         SolverContactSurface(builder.finalize(device=device))
 
 

@@ -142,12 +142,68 @@ def test_a_reset_gives_the_bits_of_the_first_steps_in_chosen_worlds(device, add_
     assert np.abs(run.x[n:] - first[n:]).max() > 1e-5
 
 
+def test_a_reset_writes_what_its_flags_name_into_the_state(device, add_block, run_of):
+    block = newton.ModelBuilder()
+    add_block(block, (0.0, 0.0, 0.0))
+    ball = block.add_body(xform=wp.transform(wp.vec3(1.0, 0.0, 0.0), STILL))
+    block.add_shape_sphere(ball, radius=0.05)
+    builder = newton.ModelBuilder()
+    builder.replicate(block, 2)
+    run = run_of(builder, device)
+    run.step(3)
+    n, flags = run.model.particle_count // 2, newton.StateFlags
+    ours = run.now
+    before = [a.numpy().copy() for a in (ours.particle_q, ours.particle_qd, ours.body_q)]
+    run.solver.reset(ours, flags=0)
+    np.testing.assert_array_equal(ours.particle_q.numpy(), before[0])
+    first = wp.array([True, False, False], dtype=wp.bool, device=device)
+    run.solver.reset(ours, first, flags=flags.PARTICLE_Q | flags.BODY_Q)
+    np.testing.assert_array_equal(ours.particle_q.numpy()[:n], run.model.particle_q.numpy()[:n])
+    np.testing.assert_array_equal(ours.particle_q.numpy()[n:], before[0][n:])
+    np.testing.assert_array_equal(ours.particle_qd.numpy(), before[1])
+    assert (ours.body_q.numpy()[:, 2] == [0.0, before[2][1, 2]]).all() and before[2][0, 2] < 0.0
+    run.solver.reset(ours)
+    for name in "particle_q", "particle_qd", "body_q", "body_qd":
+        np.testing.assert_array_equal(
+            getattr(ours, name).numpy(), getattr(run.model, name).numpy(), err_msg=name
+        )
+
+
+def test_no_particle_leaves_a_step_faster_than_the_model_lets_it(device, add_block, run_of):
+    builder = newton.ModelBuilder()
+    add_block(builder, (0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
+    run = run_of(builder, device)
+    run.model.particle_max_velocity = 2.0
+    run.step()
+    seen = np.linalg.norm(run.now.particle_qd.numpy(), axis=1)
+    np.testing.assert_allclose(seen, 2.0, rtol=1e-5)
+    x = run.x
+    run.step()
+    way = np.linalg.norm(run.x - x, axis=1)
+    np.testing.assert_allclose(way, 2.0 * DT, rtol=1e-3)  # and what gravity adds in a step
+
+
+def test_accelerations_of_bodies_are_observed(device, add_block, run_of):
+    builder = newton.ModelBuilder()
+    add_block(builder, (0.0, 0.0, 0.0))
+    for x, driven in ((1.0, False), (2.0, True)):
+        at = wp.transform(wp.vec3(x, 0.0, 0.0), STILL)
+        builder.add_shape_sphere(builder.add_body(xform=at, is_kinematic=driven), radius=0.05)
+    run = run_of(builder, device)
+    run.step(2)
+    want = [[0.0, 0.0, -9.81, 0.0, 0.0, 0.0], [0.0] * 6]
+    np.testing.assert_allclose(run.seen.body_qdd.numpy(), want, atol=5e-3)  # of fits in float32
+
+
 def test_a_capture_is_an_error_and_leaves_the_solver_as_it_was(device, add_block, run_of):
     builder = newton.ModelBuilder()
     add_block(builder, (0.0, 0.0, 0.0))
     run = run_of(builder, device)
     with pytest.raises(RuntimeError, match="cannot be captured"), wp.ScopedCapture(device):
         run.step()
+    for what, given in (("reset", run.now), ("notify_model_changed", 1)):
+        with pytest.raises(RuntimeError, match=f"{what} works"), wp.ScopedCapture(device):
+            getattr(run.solver, what)(given)
     run.step()
     assert run.x[:, 2].min() < 0.0
 

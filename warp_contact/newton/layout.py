@@ -3,16 +3,18 @@
 from dataclasses import dataclass
 
 import numpy as np
-from newton import Model
+from newton import Model, StateFlags
 
-from warp_contact.newton.refusals import active, kinematic, numbers, refuse, some
-from warp_contact.newton.shapes import collides, half_space, mesh_of
+from warp_contact.newton.joints import attach, start_poses
+from warp_contact.newton.refusals import active, collides, kinematic, numbers, refuse, some
+from warp_contact.newton.shapes import half_space, mesh_of, union
 from warp_contact.scene.materials import NeoHookean, Rigid
-from warp_contact.scene.mesh import TetMesh
+from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.pieces import components
 from warp_contact.scene.scene import Scene
 
 STRAIN = 1e-3  # of tets where the model begins, against their rest poses
+STATE = StateFlags.PARTICLE_Q, StateFlags.PARTICLE_QD, StateFlags.BODY_Q, StateFlags.BODY_QD
 SAME = 1e-4  # relative: materials of one body
 
 
@@ -58,13 +60,23 @@ class Layout:
         scene: with all bodies where the model had them
         soft: those of tets
         solid: those that are rigid
-        start: ``particle_q``, ``particle_qd``, ``body_q`` and ``body_qd`` of the model then
+        start: ``particle_q``, ``particle_qd``, ``body_q`` and ``body_qd`` there
     """
 
     scene: Scene
     soft: list[Soft]
     solid: list[Solid]
     start: tuple[np.ndarray, ...]
+
+    def restore(self, state, particles: np.ndarray, bodies: np.ndarray, flags: int) -> None:
+        """Write into a state what ``flags`` name, of chosen particles and bodies, masks (n,)."""
+        arrays = state.particle_q, state.particle_qd, state.body_q, state.body_qd
+        chosen = particles, particles, bodies, bodies
+        for flag, array, start, own in zip(STATE, arrays, self.start, chosen, strict=True):
+            if flags & int(flag) and own.any():
+                now = array.numpy()
+                now[own] = start[own]
+                array.assign(now)
 
 
 def lay_out(model: Model, thickness: float | None) -> Layout:
@@ -77,10 +89,12 @@ def lay_out(model: Model, thickness: float | None) -> Layout:
     scene = Scene(gravity=_gravity(model), friction=float(model.soft_contact_mu))
     worlds = _worlds(model)
     soft = _add_soft(model, scene, worlds)
-    solid = _add_solids(model, scene, worlds, thickness)
+    poses = start_poses(model)
+    solid = _add_solids(model, scene, worlds, poses, thickness)
+    attach(model, scene, {one.body: scene.bodies[one.index] for one in solid}, poses)
     _add_static(model, scene, worlds, thickness)
-    start = model.particle_q, model.particle_qd, model.body_q, model.body_qd
-    return Layout(scene, soft, solid, tuple(numbers(a).copy() for a in start))
+    start = numbers(model.particle_q), numbers(model.particle_qd), poses, numbers(model.body_qd)
+    return Layout(scene, soft, solid, tuple(a.copy() for a in start))
 
 
 def _gravity(model: Model) -> list[float]:
@@ -178,33 +192,47 @@ def _material(
 
 
 def _add_solids(
-    model: Model, scene: Scene, worlds: list[int], thickness: float | None
+    model: Model, scene: Scene, worlds: list[int], poses: np.ndarray, thickness: float | None
 ) -> list[Solid]:
     out: list[Solid] = []
     driven, shapes = kinematic(model), collides(model)
     for b in range(model.body_count):
         name = f"body {b} '{model.body_label[b]}'"
-        own = [k for k in model.body_shapes.get(b, []) if shapes[k]]
-        if len(own) != 1:
-            raise ValueError(f"{name} has {len(own)} shapes that collide: one is simulated")
-        q = model.body_q.numpy()[b].astype(np.float64)
+        mesh, friction = _geometry(model, b, name, shapes, thickness)
+        q = poses[b].astype(np.float64)
         motion = {}
         if not driven[b]:
             qd = model.body_qd.numpy()[b].astype(np.float64)
             motion = {"velocity": qd[:3], "angular_velocity": qd[3:]}
         body = scene.add_body(
-            mesh_of(model, own[0], thickness),
+            mesh,
             Rigid(1.0) if driven[b] else _rigid(model, b),
             q[:3],
             q[3:],
             fixed=bool(driven[b]),
             label=name,
             world=_world(model.body_world.numpy()[b], worlds),
-            friction=float(model.shape_material_mu.numpy()[own[0]]),
+            friction=friction,
             **motion,
         )
         out.append(Solid(body.index, _last(scene), b, bool(driven[b])))
     return out
+
+
+def _geometry(
+    model: Model, b: int, name: str, shapes: np.ndarray, thickness: float | None
+) -> tuple[TetMesh, float]:
+    """Mesh and friction of a body: all its shapes that collide."""
+    own = [k for k in model.body_shapes.get(b, []) if shapes[k]]
+    if not own:
+        raise ValueError(f"{name} has no shape that collides: give it one")
+    mu = model.shape_material_mu.numpy()[own].astype(np.float64)
+    if np.ptp(mu) > SAME * mu.max():
+        raise ValueError(f"{name} has shapes with a mu of {some(mu)}: a body has one")
+    try:
+        return union([mesh_of(model, k, thickness) for k in own]), float(mu[0])
+    except MeshError as error:
+        raise ValueError(f"{name} has shapes {own} that make no body: {error}") from None
 
 
 def _rigid(model: Model, b: int) -> Rigid:
@@ -219,7 +247,7 @@ def _rigid(model: Model, b: int) -> Rigid:
 
 def _add_static(model: Model, scene: Scene, worlds: list[int], thickness: float | None) -> None:
     """Endless planes as half-spaces, other shapes as held bodies, one in each of their worlds."""
-    shapes = collides(model) & (model.shape_body.numpy() < 0) if model.shape_count else []
+    shapes = collides(model) & (numbers(model.shape_body) < 0)
     planes: dict[tuple, set[int]] = {}
     for k in np.flatnonzero(shapes).tolist():
         world, mu = int(model.shape_world.numpy()[k]), float(model.shape_material_mu.numpy()[k])

@@ -1,7 +1,7 @@
 """Shapes of Newton as meshes of tets."""
 
 import numpy as np
-from newton import GeoType, Mesh, Model, ShapeFlags
+from newton import GeoType, Mesh, Model
 
 from warp_contact.scene.mesh import MeshError, TetMesh
 from warp_contact.scene.scene import rotation_matrix
@@ -13,12 +13,6 @@ BALL = 309  # vertices of a sphere: facets that are 0.3 % of the radius inside i
 RINGS = 4  # of a cylinder
 PART = 0.05  # of the diagonal of a surface: the thickness of its shell
 SEAM = 1e-6  # of the same: vertices nearer than that are one
-
-
-def collides(model: Model) -> np.ndarray:
-    """Which shapes touch particles or other shapes, shape (n,)."""
-    both = int(ShapeFlags.COLLIDE_PARTICLES) | int(ShapeFlags.COLLIDE_SHAPES)
-    return model.shape_flags.numpy().astype(int) & both != 0
 
 
 def half_space(model: Model, k: int) -> tuple[tuple[float, ...], float] | None:
@@ -56,6 +50,16 @@ def mesh_of(model: Model, k: int, thickness: float | None) -> TetMesh:
         raise ValueError(f"{name}: {error}") from None
     place = model.shape_transform.numpy()[k].astype(np.float64)
     return mesh.transformed(rotation_matrix(place[3:]), place[:3])
+
+
+def union(meshes: list[TetMesh]) -> TetMesh:
+    """All meshes as one; where they lie side by side, vertices in the same place are joined."""
+    if len(meshes) == 1:
+        return meshes[0]
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    tets = [mesh.tets + start for mesh, start in zip(meshes, first[:-1], strict=True)]
+    whole = TetMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(tets))
+    return whole.welded() if len(whole.seams) else whole
 
 
 def _surface(model: Model, k: int, kind: GeoType) -> Surface:

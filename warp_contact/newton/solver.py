@@ -1,72 +1,47 @@
 """``SolverContactSurface``: contact surfaces as a solver of Newton."""
 
-from dataclasses import dataclass
-
 import newton
 import numpy as np
-import warp as wp
+from newton import StateFlags
 from newton.solvers import SolverBase
 
 from warp_contact import Simulation, checks
+from warp_contact.newton import observables as told
+from warp_contact.newton.coupling import Coupling
+from warp_contact.newton.joints import add_joint_forces
 from warp_contact.newton.layout import Soft, Solid, lay_out
 from warp_contact.newton.refusals import numbers
 from warp_contact.scene.pose import rigid_motion_of
 from warp_contact.scene.scene import rotation_matrix
 
 SAME = 1e-6  # relative: of a length of the step
+UNLIMITED = 1e5  # particle_max_velocity as Newton sets it [m/s]
 
 
-def field(dtype):
-    """An observable of each particle."""
-    every = newton.Model.AttributeFrequency.PARTICLE
-    return SolverBase.Observables.field(dtype=dtype, frequency=every)
-
-
-class SolverContactSurface(SolverBase):
+class SolverContactSurface(Coupling, SolverBase):
     """Soft bodies of tets, rigid bodies and static shapes that touch by contact surfaces.
 
     A step of Newton is a frame here: it is divided into as many steps as are stable. How many is
     decided on the host, so that ``step`` cannot be captured: it raises RuntimeError within a
-    capture. Contacts are found by the solver itself: ``contacts`` and ``control`` are not looked
-    at, nor are radii of particles, nor stiffness and damping of contacts.
+    capture. Contacts are found by the solver itself: ``contacts`` are not looked at, nor are radii
+    of particles, nor stiffness and damping of contacts. Of ``control`` forces of joints act.
 
     Tets of a piece are a body with the material of SolverVBD: Lame parameters k_mu and k_lambda,
     and a damping time 4 k_damp / E, with which a bar that stretches has the same viscous stress.
     Its mass is that of its particles, divided among them by volume. Particles without mass, or not
     active, are held: what the user writes into their positions is where they are at the end of the
-    step, and they move by their velocities. So are bodies that are kinematic or without mass, by
-    ``body_q`` alone. Friction between two bodies, or a body and a shape, is the mean of theirs;
-    soft ones have ``model.soft_contact_mu``. Groups and filters of collisions are not looked at,
-    nor is contact of a body with itself.
+    step, and they move by their velocities. So are bodies that are kinematic, without mass or
+    fixed to the world, by ``body_q`` alone. All shapes of a body that collide are one. Joints that
+    are fixed, ball, revolute or prismatic hold hard. Friction between two bodies, or a body and a
+    shape, is the mean of theirs; soft ones have ``model.soft_contact_mu``. There is no contact of a
+    body with itself, nor of bodies with a joint.
 
     ``particle_f`` acts as an impulse at the beginning of the step, ``body_f`` during the step.
     """
 
-    SUPPORTED_OBSERVABLES = frozenset(
-        {"particle_contact_f", "particle_pressure", "particle_penetration"}
-    )
-
-    class ObservableKind(SolverBase.ObservableKind):
-        """Of each particle, beside those of Newton."""
-
-        PARTICLE_CONTACT_F = "particle_contact_f"
-        PARTICLE_PRESSURE = "particle_pressure"
-        PARTICLE_PENETRATION = "particle_penetration"
-
-    @dataclass(eq=False)
-    class Observables(SolverBase.Observables):
-        """What contact did to each particle, soft against soft too.
-
-        Attributes:
-            particle_contact_f: mean contact force of the step [N], shape (particle_count,)
-            particle_pressure: the same over the area of the surface there [Pa]
-            particle_penetration: how deep it was inside another body before it was put right [m]
-        """
-
-        # They return fields, not defaults that are shared.
-        particle_contact_f: wp.array | None = field(wp.vec3)  # noqa: RUF009
-        particle_pressure: wp.array | None = field(wp.float32)  # noqa: RUF009
-        particle_penetration: wp.array | None = field(wp.float32)  # noqa: RUF009
+    SUPPORTED_OBSERVABLES = told.SUPPORTED
+    ObservableKind = told.ObservableKind
+    Observables = told.Observables
 
     def __init__(
         self,
@@ -84,8 +59,9 @@ class SolverContactSurface(SolverBase):
                 default 0.05 of the diagonal of each
 
         Raises:
-            ValueError: naming what cannot be simulated: joints, springs, cloth, grains, skins,
-                bodies of several shapes or materials, unknown shapes, a model with gradients
+            ValueError: naming what cannot be simulated: other joints, drives, springs, cloth,
+                grains, skins, bodies of several materials, unknown shapes, margins, restitution,
+                groups and filters of collisions, a model with gradients
         """
         super().__init__(model)
         if thickness is not None:
@@ -93,6 +69,7 @@ class SolverContactSurface(SolverBase):
         self._integrator, self._thickness = integrator, thickness
         self._layout = lay_out(model, thickness)
         self.simulation: Simulation | None = None
+        self._forget()
 
     def step(self, state_in, state_out, control, contacts, dt, *, observables=None) -> None:
         """Go on by ``dt`` [s] from one state to the other, which may be the same.
@@ -104,46 +81,87 @@ class SolverContactSurface(SolverBase):
             RuntimeError: within a capture
             SimulationError: no step is stable, or a number is not finite
         """
-        if self.device.is_capturing:
-            raise RuntimeError(
-                "SolverContactSurface.step decides on the host how many steps it takes, and cannot "
-                "be captured: call it in every frame"
-            )
+        self._refuse_capture("step")
         self.validate_observables(observables)
+        forces = self._joint_forces(control)
         sim = self._at(checks.positive(dt, "dt"))
         try:
-            given = self._take(sim, state_in, dt)
+            given = self._take(sim, state_in, forces, dt)
             sim.step_frame()
             self._give(sim, state_out, *given)
+            self._stepped = True
+            self._count(sim, dt)
         except BaseException:
             self._lose()
             raise
         if observables is not None and observables.kinds:
-            self._observe(sim, observables)
+            told.observe(sim, self._layout, (self._twist - given[3]) / dt, observables)
 
     def reset(self, state, world_mask=None, flags=None) -> None:
-        """Forget what was before; the next step begins where its state is, as the first one did.
+        """Begin anew: the next step begins where its state is, as the first one did.
 
-        With ``world_mask`` in these worlds alone; the state itself is left as it is.
+        What ``flags`` name of particles and bodies is written into the state as the model has it,
+        by default their positions and velocities; ``flags=0`` leaves the state as it is. With
+        ``world_mask`` in these worlds alone.
+
+        Raises:
+            RuntimeError: within a capture
         """
+        self._refuse_capture("reset")
         mask = self._normalize_reset_world_mask(world_mask)
+        worlds = self.model.world_count + 1  # the last one is world -1
+        chosen = np.ones(worlds, dtype=bool) if mask is None else mask.numpy()
+        particles = chosen[numbers(self.model.particle_world).astype(int)]
+        bodies = chosen[numbers(self.model.body_world).astype(int)]
+        every = StateFlags.PARTICLE | StateFlags.BODY
+        self._layout.restore(state, particles, bodies, int(every if flags is None else flags))
         if self.simulation is None:
             return
         if mask is None:
             self._begin(self.simulation)
             return
-        chosen = mask.numpy()  # the last one is that of world -1
-        self._jump |= chosen[numbers(self.model.particle_world).astype(int)]
-        self._jump_body |= chosen[numbers(self.model.body_world).astype(int)]
+        self._jump |= particles
+        self._jump_body |= bodies
 
     def notify_model_changed(self, flags) -> None:
         """Translate the model anew; the next step begins where its state is.
 
         Raises:
             ValueError: as for a new solver
+            RuntimeError: within a capture
         """
+        self._refuse_capture("notify_model_changed")
         self._layout = lay_out(self.model, self._thickness)
         self.simulation = None
+        self._forget()
+
+    def set_collision_frequency(self, **schedule) -> None:
+        """Contacts are found in each step; raises ValueError for another schedule."""
+        if any(schedule.values()):
+            raise ValueError("SolverContactSurface finds contacts in each step: leave it to it")
+        super().set_collision_frequency()
+
+    def update_contacts(self, contacts, state=None) -> None:
+        """Contacts of Newton are not looked at: raises NotImplementedError."""
+        raise NotImplementedError(
+            "SolverContactSurface finds contacts by itself: ask for the observable "
+            "particle_contact_f, or for solver.simulation.contacts()"
+        )
+
+    def _refuse_capture(self, what: str) -> None:
+        if self.device.is_capturing:
+            raise RuntimeError(
+                f"SolverContactSurface.{what} works on the host too, where it decides how many "
+                "steps it takes, and cannot be captured: call it in every frame"
+            )
+
+    def _joint_forces(self, control) -> np.ndarray:
+        """Generalized forces, shape (joint_dof_count,); raises ValueError for activations."""
+        if control is None:
+            return numbers(self.model.joint_f)
+        if numbers(control.tet_activations).any():
+            raise ValueError("control.tet_activations is not zero: tets have no muscles here")
+        return numbers(control.joint_f)
 
     def _at(self, dt: float) -> Simulation:
         """A simulation whose frames are ``dt`` [s] long."""
@@ -159,9 +177,13 @@ class SolverContactSurface(SolverBase):
     def _begin(self, sim: Simulation) -> None:
         """Begin where the scene does; held ones are put where the state has them."""
         sim.reset()
+        self._forget()
+
+    def _forget(self) -> None:
         self._q, self._qd, self._pose, self._twist = (a.copy() for a in self._layout.start)
         self._jump = np.ones(self.model.particle_count, dtype=bool)
         self._jump_body = np.ones(self.model.body_count, dtype=bool)
+        self._gained = np.zeros((self.model.body_count, 6))
 
     def _lose(self) -> None:
         """After an error nothing is known: the next step puts everything where its state has it."""
@@ -169,7 +191,9 @@ class SolverContactSurface(SolverBase):
             last[:] = np.nan
         self._jump[:], self._jump_body[:] = True, True
 
-    def _take(self, sim: Simulation, state, dt: float) -> tuple[np.ndarray, ...]:
+    def _take(
+        self, sim: Simulation, state, forces: np.ndarray, dt: float
+    ) -> tuple[np.ndarray, ...]:
         """Put everything where a state has it; return its positions, poses and their velocities."""
         arrays = state.particle_q, state.particle_qd, state.body_q, state.body_qd
         q, qd, poses, twists = (numbers(a) for a in arrays)
@@ -181,7 +205,9 @@ class SolverContactSurface(SolverBase):
                 push[own] += dt * force[own] * inv_mass[soft.vertices][:, None]
         for soft in self._layout.soft:
             self._take_soft(sim, soft, q, push, dt)
-        wrench = numbers(state.body_f)
+        wrench = numbers(state.body_f).astype(np.float64)
+        if forces.any():
+            add_joint_forces(self.model, forces, poses, wrench)
         for solid in self._layout.solid:
             b = solid.body
             self._take_solid(sim, solid, poses[b], twists[b], wrench[b])
@@ -229,6 +255,8 @@ class SolverContactSurface(SolverBase):
             own, free = soft.particles, ~soft.held  # those of held ones are the user's
             self._q[own] = x[soft.vertices]
             self._qd[own[free]] = v[soft.vertices][free]
+            if self.model.particle_max_velocity < UNLIMITED:
+                self._limit(sim, soft)
         state.particle_q.assign(self._q)
         state.particle_qd.assign(self._qd)
         if self.model.body_count:
@@ -236,6 +264,15 @@ class SolverContactSurface(SolverBase):
                 self._give_solid(sim, solid, v[solid.vertices])
             state.body_q.assign(self._pose)
             state.body_qd.assign(self._twist)
+
+    def _limit(self, sim: Simulation, soft: Soft) -> None:
+        """Slow down particles that are faster than the model lets them."""
+        own, free = soft.particles, np.flatnonzero(~soft.held)
+        speed = np.linalg.norm(self._qd[own[free]], axis=1, keepdims=True)
+        most = self.model.particle_max_velocity
+        if speed.max(initial=0.0) > most:
+            self._qd[own[free]] *= np.minimum(1.0, most / np.maximum(speed, most))
+            sim.set_velocity(soft.index, self._qd[own[free]], free)
 
     def _give_solid(self, sim: Simulation, solid: Solid, v: np.ndarray) -> None:
         place = sim.pose(solid.index)
@@ -245,17 +282,10 @@ class SolverContactSurface(SolverBase):
         self._pose[solid.body] = np.concatenate(place)
         self._twist[solid.body] = np.concatenate(motion)
 
-    def _observe(self, sim: Simulation, observables) -> None:
-        fields = sim.contact_fields()
-        names = {"particle_contact_f": "force", "particle_pressure": "pressure"}
-        names |= {"particle_penetration": "penetration"}
-        for kind, name in names.items():
-            if observables.is_requested(kind):
-                array = getattr(observables, kind)
-                out = np.zeros((self.model.particle_count, *fields[name].shape[1:]), np.float32)
-                for soft in self._layout.soft:
-                    out[soft.particles] = fields[name][soft.vertices]
-                array.assign(out)
+    def _centre(self, b: int, poses: np.ndarray) -> np.ndarray:
+        """Centre of mass [m] of body ``b`` at one of the poses, shape (n, 7)."""
+        centre, q = self.model.body_com.numpy()[b], poses[b].astype(np.float64)
+        return _placed(centre.astype(np.float64), q[:3], q[3:])
 
 
 def _placed(point: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:

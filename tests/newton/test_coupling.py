@@ -1,0 +1,142 @@
+"""newton/coupling.py: the solver beside others in the coupled solvers of Newton."""
+
+import numpy as np
+import pytest
+
+newton = pytest.importorskip("newton", "1.8")
+import warp as wp  # noqa: E402
+from newton.solvers.experimental.coupled import SolverCoupledProxy as Coupled  # noqa: E402
+
+from warp_contact.newton import SolverContactSurface  # noqa: E402
+
+NONE = (0.0, 0.0, 0.0)
+STILL = wp.quat_identity()
+DT = 1.0 / 240.0
+
+
+def add_ball(builder, at, **more) -> int:
+    ball = builder.add_body(xform=wp.transform(wp.vec3(*at), STILL), **more)
+    builder.add_shape_sphere(ball, radius=0.05)
+    return ball
+
+
+class Pair:
+    """A ball of SolverXPBD, and the rest of a model in ours; the ball is a proxy there."""
+
+    def __init__(self, builder, ball, device, own=(), iterations=1, substeps=1, **proxy):
+        self.model = builder.finalize(device=device)
+        particles, entry = list(range(self.model.particle_count)), Coupled.Entry
+        theirs = {"bodies": [ball], "joints": [ball]}  # the number of its free joint
+        ours = {"particles": particles, "bodies": own, "joints": own, "substeps": substeps}
+        proxies = [Coupled.Proxy(source="hard", destination="soft", bodies=[ball], **proxy)]
+        self.solver = Coupled(
+            model=self.model,
+            entries=[
+                entry(name="hard", solver=newton.solvers.SolverXPBD, **theirs),
+                entry(name="soft", solver=SolverContactSurface, **ours),
+            ],
+            coupling=Coupled.Config(proxies=proxies, iterations=iterations),
+        )
+        self.now, self.then = self.model.state(), self.model.state()
+
+    def step(self, n=1) -> None:
+        for _ in range(n):
+            self.now.clear_forces()
+            self.solver.step(self.now, self.then, None, None, DT)
+            self.now, self.then = self.then, self.now
+
+    def momentum(self) -> np.ndarray:
+        ball = self.model.body_mass.numpy()[0] * self.now.body_qd.numpy()[0, :3]
+        entry = self.solver._entries["soft"].solver.simulation
+        mass = self.model.particle_mass.numpy() if entry is None else entry.model.mass.numpy()
+        own = slice(0, self.model.particle_count)
+        return ball + mass[own] @ self.now.particle_qd.numpy()
+
+
+@pytest.mark.parametrize("more", [{}, {"substeps": 2}, {"mode": "staggered"}])
+def test_a_ball_of_another_solver_hits_a_block(device, more, add_block, run_of):
+    def build():
+        builder = newton.ModelBuilder(gravity=NONE)
+        add_block(builder, NONE)
+        ball = add_ball(builder, (0.05, 0.05, 0.155))
+        builder.body_qd[ball] = (0.0, 0.0, -0.5, 0.0, 0.0, 0.0)
+        return builder, ball
+
+    pair = Pair(*build(), device, **more)
+    before = pair.momentum()
+    pair.step(40)
+    # Both have parted, and the last force has arrived a step later: rounding of impulses.
+    np.testing.assert_allclose(pair.momentum(), before, atol=1e-5 * np.abs(before).max())
+    alone = run_of(build()[0], device)
+    alone.step(40)
+    want = alone.now.particle_qd.numpy()[:, 2].mean()
+    seen = pair.now.particle_qd.numpy()[:, 2].mean()
+    assert want < -0.05 and seen == pytest.approx(want, rel=0.05)  # forces are a step late
+
+
+def test_a_ball_of_another_solver_lies_on_a_block(device, add_block):
+    builder = newton.ModelBuilder()
+    builder.add_ground_plane()
+    add_block(builder, (0.0, 0.0, 1e-4))
+    ball = add_ball(builder, (0.05, 0.05, 0.15))
+    pair = Pair(builder, ball, device)
+    pair.step(120)
+    assert abs(pair.now.body_qd.numpy()[0, 2]) < 0.02
+    assert 0.14 < pair.now.body_q.numpy()[0, 2] < 0.15
+
+
+def test_a_proxy_tells_nothing_of_statics_which_its_own_solver_has(device, add_block):
+    builder = newton.ModelBuilder()
+    add_block(builder, (1.0, 0.0, 0.0))
+    ball = add_ball(builder, (0.0, 0.0, 0.0499))
+    at = wp.transform(wp.vec3(0.0, 0.0, -0.1), STILL)
+    builder.add_shape_box(-1, xform=at, hx=0.1, hy=0.1, hz=0.1)
+    pair = Pair(builder, ball, device)
+    pair.step(3)
+    # SolverXPBD was given no contacts: the ball falls.
+    qd = pair.now.body_qd.numpy()[0]
+    np.testing.assert_allclose(qd[:3], [0.0, 0.0, -9.81 * 3 * DT], atol=1e-5)
+    np.testing.assert_allclose(qd[3:], 0.0, atol=0.02)  # the force acts at points of facets
+
+
+def test_iterations_begin_where_the_step_did(device, add_block):
+    ends = []
+    for iterations in 1, 3:
+        builder = newton.ModelBuilder(gravity=NONE)
+        add_block(builder, NONE, fix_right=True)
+        ball = add_ball(builder, (5.0, 0.0, 0.0))
+        wall = add_ball(builder, (-0.06, 0.05, 0.05), is_kinematic=True)
+        pair = Pair(builder, ball, device, own=[wall], iterations=iterations)
+        held = np.flatnonzero(pair.model.particle_mass.numpy() == 0.0)
+        for k in range(6):
+            pose, v = pair.now.body_q.numpy().copy(), pair.now.particle_qd.numpy().copy()
+            pose[wall, 0] = -0.06 + 0.003 * (k + 1)
+            v[held, 1] = 0.1
+            pair.now.body_q.assign(pose)
+            pair.now.particle_qd.assign(v)
+            pair.step()
+        ends.append(pair.now.particle_q.numpy())
+    assert (ends[0] - pair.model.particle_q.numpy())[:, 0].max() > 1e-3
+    np.testing.assert_allclose(*ends, atol=1e-5)
+
+
+def test_particles_of_another_solver_are_refused(device, add_block):
+    builder = newton.ModelBuilder()
+    add_block(builder, NONE)
+    add_block(builder, (1.0, 0.0, 0.0))
+    ball = add_ball(builder, (5.0, 0.0, 0.0))
+    builder.color()
+    model = builder.finalize(device=device)
+    n, entry = model.particle_count // 2, Coupled.Entry
+    proxy = Coupled.Proxy(source="other", destination="soft", particles=range(n))
+    ours = {"particles": range(n, 2 * n)}
+    theirs = {"particles": range(n), "bodies": [ball], "joints": [0]}
+    with pytest.raises(ValueError, match="cannot be proxies"):
+        Coupled(
+            model=model,
+            entries=[
+                entry(name="other", solver=newton.solvers.SolverVBD, **theirs),
+                entry(name="soft", solver=SolverContactSurface, **ours),
+            ],
+            coupling=Coupled.Config(proxies=[proxy]),
+        )

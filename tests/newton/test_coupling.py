@@ -74,15 +74,19 @@ def test_a_ball_of_another_solver_hits_a_block(device, more, add_block, run_of):
     assert want < -0.05 and seen == pytest.approx(want, rel=0.05)  # forces are a step late
 
 
-def test_a_ball_of_another_solver_lies_on_a_block(device, add_block):
-    builder = newton.ModelBuilder()
-    builder.add_ground_plane()
-    add_block(builder, (0.0, 0.0, 1e-4))
-    ball = add_ball(builder, (0.05, 0.05, 0.15))
-    pair = Pair(builder, ball, device)
+def test_a_ball_of_another_solver_lies_on_a_block_as_one_of_this_does(device, add_block, run_of):
+    def build():
+        builder = newton.ModelBuilder()
+        builder.add_ground_plane()
+        add_block(builder, (0.0, 0.0, 1e-4))
+        return builder, add_ball(builder, (0.05, 0.05, 0.15))
+
+    pair, alone = Pair(*build(), device), run_of(build()[0], device)
     pair.step(120)
-    assert abs(pair.now.body_qd.numpy()[0, 2]) < 0.02
-    assert 0.14 < pair.now.body_q.numpy()[0, 2] < 0.15
+    alone.step(120)
+    # It rolls off slowly in both. Left to jumps each step, the proxy sinks in by 7e-4 m.
+    want = alone.now.body_q.numpy()[0, 2]
+    np.testing.assert_allclose(pair.now.body_q.numpy()[0, 2], want, atol=3e-4)
 
 
 def test_a_proxy_tells_nothing_of_statics_which_its_own_solver_has(device, add_block):

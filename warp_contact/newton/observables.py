@@ -60,10 +60,7 @@ def observe(sim: Simulation, layout: Layout, gained: np.ndarray, observables: Ob
         observables: with their arrays
     """
     if observables.is_requested("body_qdd"):
-        out = np.zeros(gained.shape, np.float32)
-        moving = [solid.body for solid in layout.solid if not solid.driven]
-        out[moving] = gained[moving]
-        observables.body_qdd.assign(out)
+        observables.body_qdd.assign(gained.astype(np.float32))
     asked = {kind: name for kind, name in FIELDS.items() if observables.is_requested(kind)}
     fields = sim.contact_fields() if asked else {}
     for kind, name in asked.items():

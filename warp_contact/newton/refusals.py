@@ -195,7 +195,7 @@ def _joined(model: Model, i: np.ndarray, j: np.ndarray) -> np.ndarray:
     ends = np.stack([numbers(model.joint_parent), numbers(model.joint_child)]).astype(np.int64)
     low, high = np.sort(ends[:, holds & (ends[0] >= 0)], axis=0)
     first, second = np.sort([body[i], body[j]], axis=0)
-    return (first >= 0) & np.isin(first * n + second, low * n + high)
+    return np.isin(first * n + second, low * n + high)  # below zero with the world
 
 
 def holding(model: Model) -> np.ndarray:

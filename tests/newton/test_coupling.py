@@ -5,6 +5,7 @@ import pytest
 
 newton = pytest.importorskip("newton", "1.8")
 import warp as wp  # noqa: E402
+from newton.solvers.experimental.coupled import SolverCoupledADMM  # noqa: E402
 from newton.solvers.experimental.coupled import SolverCoupledProxy as Coupled  # noqa: E402
 
 from warp_contact.newton import SolverContactSurface  # noqa: E402
@@ -143,4 +144,54 @@ def test_particles_of_another_solver_are_refused(device, add_block):
                 entry(name="soft", solver=SolverContactSurface, **ours),
             ],
             coupling=Coupled.Config(proxies=[proxy]),
+        )
+
+
+def test_a_grain_of_another_solver_hits_particles_of_a_block(device, add_block):
+    builder = newton.ModelBuilder(gravity=NONE)
+    add_block(builder, NONE, particle_radius=0.02)
+    own = range(builder.particle_count)
+    grain = builder.add_particle((0.05, 0.05, 0.145), (0.0, 0.0, -0.5), 0.3, radius=0.02)
+    model = builder.finalize(device=device)
+
+    def strip(view):  # the forces of tets are ours
+        view.tri_count = view.edge_count = view.tet_count = 0
+
+    other = {"particles": [grain], "configure_view": strip}
+    proxy = Coupled.Proxy(source="soft", destination="hard", particles=own)
+    solver = Coupled(
+        model=model,
+        entries=[
+            Coupled.Entry(name="soft", solver=SolverContactSurface, particles=own),
+            Coupled.Entry(name="hard", solver=newton.solvers.SolverXPBD, **other),
+        ],
+        coupling=Coupled.Config(proxies=[proxy]),
+    )
+    now, then = model.state(), model.state()
+    for _ in range(20):
+        now.clear_forces()
+        solver.step(now, then, None, None, DT)
+        now, then = then, now
+    v = now.particle_qd.numpy()[:, 2]
+    mass = solver._entries["soft"].solver.simulation.model.mass.numpy()
+    assert v[grain] > 0.1 and v[:grain].mean() < -0.03
+    # Forces on particles are given to them as they are: rounding.
+    assert mass[:grain] @ v[:grain] + 0.3 * v[grain] == pytest.approx(-0.15, rel=1e-4)
+
+
+def test_another_coupling_is_refused(device, add_block):
+    builder = newton.ModelBuilder()
+    add_block(builder, NONE)
+    ball = add_ball(builder, (5.0, 0.0, 0.0))
+    model = builder.finalize(device=device)
+    entry = SolverCoupledADMM.Entry
+    own = {"particles": range(model.particle_count)}
+    with pytest.raises(NotImplementedError, match="by SolverCoupledProxy alone"):
+        SolverCoupledADMM(
+            model=model,
+            entries=[
+                entry(name="hard", solver=newton.solvers.SolverXPBD, bodies=[ball], joints=[0]),
+                entry(name="soft", solver=SolverContactSurface, **own),
+            ],
+            coupling=SolverCoupledADMM.Config(),
         )

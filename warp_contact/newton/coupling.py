@@ -25,6 +25,21 @@ class Coupling(CouplingInterface):
         """All of a surface touches; contacts are found here, whatever is passed."""
         return True
 
+    def coupling_eval_gravity_acceleration(
+        self, out_body_acceleration, out_particle_acceleration
+    ) -> None:
+        """As Newton does it; raises NotImplementedError for a coupling that is not by proxies.
+
+        ADMM alters velocities of single particles between its iterations, by their masses; here
+        the mass of a body is divided among them otherwise.
+        """
+        if not self._proxies.any():
+            raise NotImplementedError(
+                "SolverContactSurface is coupled by SolverCoupledProxy alone: make rigid bodies of "
+                "the other solver proxies in this one"
+            )
+        super().coupling_eval_gravity_acceleration(out_body_acceleration, out_particle_acceleration)
+
     def coupling_notify_iteration_restarts(self, enabled: bool) -> None:
         """Steps may begin again: then each keeps where it began, which is all of a checkpoint."""
         self._restarts = enabled

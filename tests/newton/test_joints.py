@@ -213,3 +213,53 @@ def test_a_joint_is_closed_where_joint_q_has_it_or_refused(device, add_block):
     builder.add_joint_ball(-1, 1, parent_xform=at(9.0), label="loop")
     with pytest.raises(ValueError, match="'loop' is closed neither"):
         SolverContactSurface(builder.finalize(device=device))
+
+
+def hang(builder, stiffness, damping=0.0, off=0.0):
+    """A block of which the top is held by a plate below which it hangs."""
+    plate = builder.add_body(xform=at(0.05, 0.05, 0.11), is_kinematic=True)
+    builder.add_shape_box(plate, hx=0.05, hy=0.05, hz=0.005)
+    top = [k for k, x in enumerate(builder.particle_q) if x[2] > 0.099]
+    for k in top:
+        point = np.array(builder.particle_q[k]) - [0.05, 0.05, 0.11 + off]
+        more = {"body_point": wp.vec3(*point), "stiffness": stiffness, "damping": damping}
+        builder.add_attachment_particle_body(k, plate, **more)
+    return top
+
+
+@pytest.mark.parametrize("stiffness", [np.inf, 2e3])
+def test_particles_that_are_attached_hang_from_a_body(device, stiffness, add_block, run_of):
+    builder = newton.ModelBuilder()
+    add_block(builder, NONE, k_damp=2e3)
+    top = hang(builder, stiffness)
+    run = run_of(builder, device)
+    run.step(240)
+    mass = run.solver.simulation.model.mass.numpy()[: run.model.particle_count].sum()
+    sag = run.model.particle_q.numpy()[top, 2] - run.x[top, 2]
+    if np.isinf(stiffness):
+        np.testing.assert_allclose(sag, 0.0, atol=1e-5)
+        return
+    # The sum of the springs carries the weight, to what is left of its vibrations.
+    np.testing.assert_allclose(stiffness * sag.sum(), mass * 9.81, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("message", "more"), [("has a damping", {"damping": 1.0}), ("0.01 m apart", {"off": 0.01})]
+)
+def test_an_attachment_that_is_damped_or_apart_is_refused(device, message, more, add_block):
+    builder = newton.ModelBuilder()
+    add_block(builder, NONE)
+    hang(builder, 1e3, **more)
+    with pytest.raises(ValueError, match=f"attachment 0 of particle .* {message}"):
+        SolverContactSurface(builder.finalize(device=device))
+
+
+def test_an_attachment_of_a_particle_without_tets_is_refused(device, add_block):
+    builder = newton.ModelBuilder()
+    add_block(builder, NONE)
+    ball = builder.add_body(xform=at(2.0))
+    builder.add_shape_sphere(ball, radius=0.1)
+    loose = builder.add_particle(wp.vec3(2.0, 0.0, 0.0), wp.vec3(), 0.0)
+    builder.add_attachment_particle_body(loose, ball)
+    with pytest.raises(ValueError, match="particle 27, which is of no tet"):
+        SolverContactSurface(builder.finalize(device=device))

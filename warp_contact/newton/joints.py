@@ -50,6 +50,40 @@ def attach(model: Model, scene: Scene, bodies: dict[int, Body], q: np.ndarray) -
         scene.attach(bodies[child], bodies.get(parent), kind, at=at, axis=line, label=label)
 
 
+def attach_particles(model: Model, scene: Scene, soft: dict[int, tuple[Body, int]], bodies, q):
+    """Hold particles at rigid bodies by springs, or hard where their stiffness is infinite.
+
+    Args:
+        model: with attachments
+        scene: with the bodies
+        soft: of each particle its body and the number of its vertex there
+        bodies: rigid ones, by their number in the model
+        q: their poses [m], shape (n, 7)
+
+    Raises:
+        ValueError: naming one that is damped, or apart from the start
+    """
+    names = "particle", "body", "body_point", "stiffness", "damping", "enabled"
+    rows = [numbers(getattr(model, f"attachment_particle_body_{name}")) for name in names]
+    for k, (i, b, point, stiffness, damping, enabled) in enumerate(zip(*rows, strict=True)):
+        if not enabled:
+            continue
+        label = f"attachment {k}"
+        if int(i) not in soft:
+            raise ValueError(f"{label} of particle {i}, which is of no tet: take it out")
+        (body, vertex), solid = soft[int(i)], bodies[int(b)]
+        if damping and np.isfinite(stiffness):
+            wanted = "springs are damped by the steps alone here; set it to zero"
+            raise ValueError(f"{label} of particle {i} has a damping: {wanted}")
+        apart = np.linalg.norm(_place(q[b], point) - body.x[vertex])
+        if apart > OPEN * _size(model, int(b)):
+            wanted = "begin with the body_point where the particle is"
+            raise ValueError(f"{label} of particle {i} is {apart:.3g} m apart: {wanted}")
+        if not (body.fixed[vertex] and solid.fixed.all()):
+            spring = float(stiffness) if np.isfinite(stiffness) else None
+            scene.attach(body, solid, "ball", vertices=[vertex], stiffness=spring, label=label)
+
+
 def add_joint_forces(model: Model, forces: np.ndarray, q: np.ndarray, wrench: np.ndarray) -> None:
     """Add generalized forces of joints to those on bodies, about their centres of mass.
 
@@ -92,10 +126,16 @@ def _first_open(model: Model, q: np.ndarray) -> int | None:
             else:
                 line = turn_a @ axis
                 apart = apart - line * (line @ apart)
-        size = numbers(model.shape_collision_radius)[model.body_shapes[_child(model, k)]].max()
-        if np.linalg.norm(apart) > OPEN * size or (kind != "ball" and np.abs(turned).max() > OPEN):
+        if np.linalg.norm(apart) > OPEN * _size(model, _child(model, k)) or (
+            kind != "ball" and np.abs(turned).max() > OPEN
+        ):
             return int(k)
     return None
+
+
+def _size(model: Model, b: int) -> float:
+    """Radius [m] of the largest shape of a body."""
+    return float(numbers(model.shape_collision_radius)[model.body_shapes[b]].max())
 
 
 def _child(model: Model, k: int) -> int:

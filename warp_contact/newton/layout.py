@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from newton import Model, StateFlags
 
-from warp_contact.newton.joints import attach, start_poses
+from warp_contact.newton.joints import attach, attach_particles, start_poses
 from warp_contact.newton.refusals import active, collides, kinematic, numbers, refuse, some
 from warp_contact.newton.shapes import half_space, mesh_of, union
 from warp_contact.scene.materials import NeoHookean, Rigid
@@ -91,7 +91,10 @@ def lay_out(model: Model, thickness: float | None) -> Layout:
     soft = _add_soft(model, scene, worlds)
     poses = start_poses(model)
     solid = _add_solids(model, scene, worlds, poses, thickness)
-    attach(model, scene, {one.body: scene.bodies[one.index] for one in solid}, poses)
+    bodies = {one.body: scene.bodies[one.index] for one in solid}
+    attach(model, scene, bodies, poses)
+    of = {int(i): (scene.bodies[s.index], k) for s in soft for k, i in enumerate(s.particles)}
+    attach_particles(model, scene, of, bodies, poses)
     _add_static(model, scene, worlds, thickness)
     start = numbers(model.particle_q), numbers(model.particle_qd), poses, numbers(model.body_qd)
     return Layout(scene, soft, solid, tuple(a.copy() for a in start))

@@ -37,7 +37,6 @@ def refuse(model: Model) -> None:
     if not model.tet_count:
         raise ValueError("the model has no tets: this solver is for soft bodies of tets")
     counts = {"spring_count": "springs", "muscle_count": "muscles"}
-    counts |= {"attachment_particle_body_count": "attachments of particles"}
     counts |= {"tendon_count": "tendons", "constraint_mimic_count": "mimic constraints"}
     for name, what in counts.items():
         if getattr(model, name):

@@ -54,7 +54,8 @@ class SolverContactSurface(Coupling, SolverBase):
 
         Args:
             model: as finalized, at rest
-            integrator: ``explicit``, ``implicit`` or ``auto``, as of ``wc.Simulation``
+            integrator: ``explicit``, ``implicit`` or ``auto``, as of ``wc.Simulation``; with rigid
+                bodies, joints or attachments of particles steps are implicit
             thickness: of the shells that stand for meshes, capsules and finite planes [m]; by
                 default 0.05 of the diagonal of each
 
@@ -169,7 +170,8 @@ class SolverContactSurface(Coupling, SolverBase):
         if sim is None or abs(sim.fps * dt - 1.0) > SAME:
             name = str(self.model.device)
             scene = self._layout.scene
-            sim = Simulation(scene, fps=1.0 / dt, device=name, integrator=self._integrator)
+            kind = "implicit" if scene.attachments else self._integrator
+            sim = Simulation(scene, fps=1.0 / dt, device=name, integrator=kind)
             self.simulation = sim
             self._begin(sim)
         return sim

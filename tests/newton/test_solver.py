@@ -193,6 +193,10 @@ def test_accelerations_of_bodies_are_observed(device, add_block, run_of):
     run.step(2)
     want = [[0.0, 0.0, -9.81, 0.0, 0.0, 0.0], [0.0] * 6]
     np.testing.assert_allclose(run.seen.body_qdd.numpy(), want, atol=5e-3)  # of fits in float32
+    run.seen.body_qdd.zero_()
+    run.then = run.now  # in place
+    run.step()
+    np.testing.assert_allclose(run.seen.body_qdd.numpy(), want, atol=5e-3)
 
 
 def test_a_capture_is_an_error_and_leaves_the_solver_as_it_was(device, add_block, run_of):

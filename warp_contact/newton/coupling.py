@@ -19,7 +19,8 @@ class Coupling(CouplingInterface):
     solver has by itself.
     """
 
-    _restarts, _stepped, _kept = False, True, (None, {}, [])
+    _restarts, _stepped = False, True
+    _kept: tuple[Simulation | None, dict, list] = (None, {}, [])
 
     def coupling_supports_full_surface_soft_contacts(self) -> bool:
         """All of a surface touches; contacts are found here, whatever is passed."""

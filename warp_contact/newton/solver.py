@@ -88,6 +88,7 @@ class SolverContactSurface(Coupling, SolverBase):
         sim = self._at(checks.positive(dt, "dt"))
         try:
             given = self._take(sim, state_in, forces, dt)
+            before = given[3].copy()  # on a CPU that is the state itself
             sim.step_frame()
             self._give(sim, state_out, *given)
             self._stepped = True
@@ -96,7 +97,7 @@ class SolverContactSurface(Coupling, SolverBase):
             self._lose()
             raise
         if observables is not None and observables.kinds:
-            told.observe(sim, self._layout, (self._twist - given[3]) / dt, observables)
+            told.observe(sim, self._layout, (self._twist - before) / dt, observables)
 
     def reset(self, state, world_mask=None, flags=None) -> None:
         """Begin anew: the next step begins where its state is, as the first one did.

@@ -34,26 +34,6 @@ class ContactArrays:
 
 
 @wp.kernel
-def keep_contacts(
-    # in
-    threads: int,
-    n_contact: wp.array[int],  # (1,)
-    contact: wp.array[Contact],  # (capacity,)
-    impulse: wp.array[Impulse],  # (capacity,)
-    # out
-    n_kept: wp.array[int],  # (1,)
-    kept: wp.array[Contact],  # (capacity,)
-    kept_impulse: wp.array[Impulse],  # (capacity,)
-):
-    """For each contact: keep it, with its impulses, before others take its place."""
-    if wp.tid() == 0:
-        n_kept[0] = n_contact[0]
-    for c in range(wp.tid(), n_contact[0], threads):
-        kept[c] = contact[c]
-        kept_impulse[c] = impulse[c]
-
-
-@wp.kernel
 def mark_contacts(
     # in
     n_contact: wp.array[int],  # (1,)

@@ -9,7 +9,7 @@ relative to its own, as it overlapped none before.
 import warp as wp
 
 from warp_contact.kernels.geometry import projected_weights
-from warp_contact.kernels.impulse.constraint import Constraint
+from warp_contact.kernels.impulse.constraint import Constraint, Impulse
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE, OLD_OVERLAP
 from warp_contact.kernels.narrow_phase.contact import Contact, gap, relative_velocity
 from warp_contact.kernels.options import OPTIONS
@@ -101,3 +101,23 @@ def find_strays(
         if below or (slid and wp.min(w) < -STRAY):
             worlds.open[world] = FIRST_LOOK
             found[OPEN] = 1
+
+
+@wp.kernel
+def keep_contacts(
+    # in
+    threads: int,
+    n_contact: wp.array[int],  # (1,)
+    contact: wp.array[Contact],  # (capacity,)
+    impulse: wp.array[Impulse],  # (capacity,)
+    # out
+    n_kept: wp.array[int],  # (1,)
+    kept: wp.array[Contact],  # (capacity,)
+    kept_impulse: wp.array[Impulse],  # (capacity,)
+):
+    """For each contact: keep it, with its impulses, before others take its place."""
+    if wp.tid() == 0:
+        n_kept[0] = n_contact[0]
+    for c in range(wp.tid(), n_contact[0], threads):
+        kept[c] = contact[c]
+        kept_impulse[c] = impulse[c]

@@ -46,6 +46,7 @@ def ready(model, x, v, dt: float, rate: float) -> tuple[State, SimpleNamespace, 
     work = SimpleNamespace(
         dt=wp.full(model.n_vert, dt, dtype=float),
         ties=None,
+        rebound=None,
         awake=SimpleNamespace(tets=tets, inv_mass=model.inv_mass),
         f_tet=wp.zeros(4 * model.n_tet, dtype=wp.vec3),
         x=wp.zeros(model.n_vert, dtype=wp.vec3),

@@ -16,6 +16,7 @@ from warp_contact.kernels.impulse import (
     rebound,
     rows,
     strike,
+    touched,
     warm_start,
 )
 from warp_contact.kernels.motion import lanczos, motion
@@ -27,7 +28,7 @@ from warp_contact.kernels.narrow_phase import (
     vertices,
 )
 from warp_contact.kernels.narrow_phase import edges as crossing
-from warp_contact.kernels.surface import closure, coupled_closure, residual
+from warp_contact.kernels.surface import closure, coupled_closure, coupled_spin, residual
 from warp_contact.kernels.ties import attachment, drive, lacking, matrix, motor, solve
 from warp_contact.kernels.ties import rows as tied_rows
 
@@ -38,7 +39,7 @@ ALWAYS += [constraint, impulse, pair_impulses, warm_start, residual]
 ALWAYS += [contact_graph, crossing, depth, persistent, vertex_contact, vertices]
 TIES = attachment, drive, lacking, matrix, motor, solve, tied_rows
 IMPLICIT = [advance, bodies, masses, mobility, predict, settle, iterations]
-IMPLICIT += [coupled, coupled_closure, rows]
+IMPLICIT += [coupled, coupled_closure, coupled_spin, rows, touched]
 
 
 def load_kernels(model: Model, device: wp.Device, implicit: bool) -> None:

@@ -13,8 +13,8 @@ from warp_contact.data.state import State
 from warp_contact.data.switches import on
 from warp_contact.data.work import Work
 from warp_contact.kernels.lengths import OLD_OVERLAP
-from warp_contact.kernels.output.contacts import keep_contacts
 from warp_contact.kernels.surface import closure
+from warp_contact.kernels.surface.residual import keep_contacts
 from warp_contact.kernels.worlds import FIRST_LOOK, SECOND_LOOK
 from warp_contact.step import coupled, residual, search, sweeps
 from warp_contact.step.contact_graph import add_parts

@@ -73,9 +73,8 @@ class Joined:
         """
         which = self._attachment(attachment)
         with exclusively(self.device):
-            ties = self._stepper.work.ties
-            impulse = float(ties.motors.sum.numpy()[which])
-        return impulse * self.fps if self.frame and ties.driven else 0.0
+            impulse = float(self._stepper.work.ties.motors.sum.numpy()[which])
+        return impulse * self.fps if self.frame else 0.0
 
     def is_attached(self, attachment: Attachment | str) -> bool:
         """Whether an attachment holds: it neither broke nor was let go.
@@ -97,6 +96,7 @@ class Joined:
         with exclusively(self.device):
             work = stepper.work
             work.ties.attachments.broken[which : which + 1].fill_(1)
+            stepper.wrench.driven[which] = 0.0
             work.broad_phase.stale.fill_(1)
             self._wake_world_of(which)
 
@@ -106,7 +106,7 @@ class Joined:
         bodies = [b for b in ties.body[which] if b >= 0]
         own = np.isin(self.model.vert_body.numpy(), bodies)
         reach = np.linalg.norm(np.ptp(x[own], axis=0)) if ties.kind[which] == "hinge" else 1.0
-        self._stepper.wrench.driven[bodies] = abs(velocity) * reach
+        self._stepper.wrench.driven[which] = abs(velocity) * reach
 
     def _wake_world_of(self, which: int) -> None:
         stepper = self._stepper

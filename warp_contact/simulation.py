@@ -200,10 +200,12 @@ class Simulation(BetweenFrames, ContactData, Joined):
                 self.set_velocity(int(body), v[part])
 
     def _mend(self, body: int) -> None:
-        """Let the attachments of a body hold as at the start."""
+        """Let the attachments of a body hold as at the start, without motors."""
         if self.model.ties:
+            own = (self.model.ties.body == body).any(axis=1)
             with exclusively(self.device):
-                self._stepper.work.ties.mend((self.model.ties.body == body).any(axis=1))
+                self._stepper.work.ties.mend(own)
+                self._stepper.wrench.driven[own] = 0.0
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""

@@ -74,6 +74,17 @@ def record(
         stale[0] = 1
 
 
+@wp.func
+def is_awake(a: int, of: Attachments, awake: wp.array[int]) -> bool:
+    """Whether one of its bodies is."""
+    if awake[of.body[a][0]] == 1:
+        return True
+    b = of.body[a][1]
+    if b < 0:
+        return False
+    return awake[b] == 1
+
+
 @wp.kernel
 def begin_frame(
     # in
@@ -83,12 +94,8 @@ def begin_frame(
 ):
     """One thread per attachment: forget its impulse, but of bodies asleep."""
     a = wp.tid()
-    both = of.body[a]
-    if awake[both[0]] == 1:
+    if is_awake(a, of, awake):
         of.impulse[a] = wp.vec3d()
-    elif both[1] >= 0:
-        if awake[both[1]] == 1:
-            of.impulse[a] = wp.vec3d()
 
 
 @wp.kernel

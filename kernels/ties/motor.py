@@ -9,7 +9,7 @@ import warp as wp
 
 from warp_contact.kernels.implicit.bodies import RIGID, Implicit, RigidMotion, as_vec3, as_vec3d
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.ties.attachment import Attachments
+from warp_contact.kernels.ties.attachment import Attachments, is_awake
 from warp_contact.kernels.ties.tie import Ties, direction
 
 wp.set_module_options(OPTIONS)
@@ -135,6 +135,20 @@ def speed_of(
 
 
 @wp.kernel
+def begin_frame(
+    # in
+    awake: wp.array[int],  # (n_body,)
+    of: Attachments,
+    # in, out
+    motors: Motors,
+):
+    """One thread per attachment: forget the force of the last frame, but of bodies asleep."""
+    a = wp.tid()
+    if is_awake(a, of, awake):
+        motors.sum[a] = wp.float64(0.0)
+
+
+@wp.kernel
 def look(
     # in
     last: bool,  # in the step: contacts have acted
@@ -148,16 +162,21 @@ def look(
     # in, out
     motors: Motors,
 ):
-    """One thread per attachment: the speed of its motor, before and after the contacts."""
+    """One thread per attachment: the speed of its motor, before and after the contacts.
+
+    What sleeps, or waits for its turn, keeps all for its next step.
+    """
     a = wp.tid()
-    h = dt[ties.vert[of.tie[of.first[a]]][0]]
-    if motors.limit[a] == 0.0 or h == 0.0:
+    if not is_awake(a, of, d.awake):
+        return
+    if motors.limit[a] == 0.0:
         motors.lost[a] = 0.0
         return
     u = speed_of(a, motors.axis[a], of, motors, ties, v, x, d, motion)
     if not last:
         motors.reached[a] = u
         return
+    h = dt[ties.vert[of.tie[of.first[a]]][0]]
     motors.lost[a] = motors.reached[a] - u
     motors.force[a] = motors.p[a] / h
     motors.sum[a] = motors.sum[a] + wp.float64(motors.p[a])

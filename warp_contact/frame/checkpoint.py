@@ -10,7 +10,7 @@ from numpy.lib.recfunctions import repack_fields
 from warp_contact.data.model import Model
 from warp_contact.files import replacing
 
-FORMAT = 10
+FORMAT = 11
 
 
 def fingerprint(model: Model, *settings) -> str:

@@ -17,7 +17,7 @@ class Wrench:
     half a step at its old value and half a step at its new one.
 
     Attributes:
-        driven: speed up to which a motor may bring each body [m/s], shape (n_body,)
+        driven: speed up to which a motor may bring bodies of each attachment [m/s], (n_attachment,)
     """
 
     def __init__(self, shapes: Shapes | None, model: Model):
@@ -29,7 +29,8 @@ class Wrench:
         self._fixed, self._held = moving == 0, moving < np.bincount(self._of_vert, minlength=n)
         self._last, self._next = np.zeros((2, 2, n, 3))
         self._kept = self._last, self._next
-        self.driven = np.zeros(n)
+        self._joined = model.ties.body if model.ties else np.zeros((0, 2), dtype=int)
+        self.driven = np.zeros(len(self._joined))
 
     def add(self, body: int, force: np.ndarray, torque: np.ndarray) -> None:
         """Let a force [N] and a torque [N m] act on body ``body`` in the next frame.
@@ -54,7 +55,9 @@ class Wrench:
 
     def gains(self, duration: float) -> np.ndarray:
         """Speed [m/s] that each body gains in a frame of ``duration`` [s] at most, (n_body,)."""
-        return duration * self._accelerations() + self.driven
+        led = np.zeros(len(self._mass) + 1)  # the last one is the world
+        np.maximum.at(led, self._joined.ravel(), np.repeat(self.driven, 2))
+        return duration * self._accelerations() + led[:-1]
 
     def _accelerations(self) -> np.ndarray:
         """How fast what acts in the next frame makes each body [m/s^2] at most, (n_body,)."""

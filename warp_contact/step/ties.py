@@ -7,7 +7,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import coupled
-from warp_contact.kernels.ties import attachment, lacking, matrix, rows, solve
+from warp_contact.kernels.ties import attachment, lacking, matrix, motor, rows, solve
 from warp_contact.step import implicit
 
 ROUNDS = 2  # of the ties in a step, as many after the contacts
@@ -18,8 +18,9 @@ def begin_frame(work: Work) -> None:
     t = work.ties
     inputs = [work.awake.bodies]
     wp.launch(attachment.begin_frame, t.n_attachment, inputs=inputs, outputs=[t.attachments])
-    if t.driven:
-        t.motors.sum.zero_()
+    if len(t.motors.which):
+        inputs = [work.awake.bodies, t.attachments]
+        wp.launch(motor.begin_frame, t.n_attachment, inputs=inputs, outputs=[t.motors])
 
 
 def begin(x: wp.array, work: Work) -> None:

@@ -185,6 +185,8 @@ class Simulation(BetweenFrames, ContactData, Joined):
                 self._stepper.reset()
                 self._moves.clear()
                 self._surroundings.reset()
+                if self.model.restitution.numpy().any():
+                    self._stepper.buffers.let_rebound()
                 self._meter = Meter(self.model)
             self.frame = 0
             return

@@ -69,6 +69,16 @@ def test_it_may_be_set_between_frames_and_is_kept_by_a_checkpoint(tmp_path):
     np.testing.assert_array_equal(tops(sim, 30), first)
 
 
+def test_it_comes_back_with_the_scene_also_where_buffers_grew_without_it():
+    sim = dropped(BALL, 0.8)
+    first = tops(sim, 30)
+    for of in 0, "plane0":
+        sim.set_restitution(of, 0.0)
+    sim._stepper.buffers.replace(sim._stepper.work.capacity)
+    sim.reset()
+    np.testing.assert_array_equal(tops(sim, 30), first)
+
+
 def test_worlds_do_not_feel_what_strikes_in_others():
     def run(worlds):
         scene = wc.Scene(friction=0.4, restitution=0.6)

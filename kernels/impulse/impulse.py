@@ -96,10 +96,16 @@ def projected(
 
 
 @wp.func
+def agree(a: float, b: float) -> bool:
+    """Whether both have the same sign; of tiny bodies their product would be 0 in float32."""
+    return (a > 0.0 and b > 0.0) or (a < 0.0 and b < 0.0)
+
+
+@wp.func
 def ahead_of(new: Impulse, before: Impulse, beta: float) -> wp.vec4:
     """The impulses extrapolated by beta; not at all where the last change went too far."""
     b = beta
-    if (before.ahead[3] - new.normal) * (new.normal - before.normal) > 0.0:
+    if agree(before.ahead[3] - new.normal, new.normal - before.normal):
         b = 0.0
     normal = new.normal + b * (new.normal - before.normal)
     friction = new.friction + b * (new.friction - before.friction)

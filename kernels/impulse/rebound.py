@@ -30,7 +30,7 @@ from warp_contact.kernels.options import OPTIONS
 
 wp.set_module_options(OPTIONS)
 
-COUNTS = wp.constant(wp.float64(2.0**40))  # energy of the mass of a body and 1 m^2/s^2
+COUNTS = wp.constant(wp.float64(2.0**50))  # energy of the mass of a body at an edge in a step
 SLIP = wp.constant(1.0)  # change of the weights in a step, above which they stay
 
 
@@ -115,12 +115,16 @@ def stop(
 
 
 @wp.func
-def add_energy(e: float, pair: wp.vec2i, d: Implicit, to: wp.array[wp.int64]):
+def add_energy(
+    e: float, h: float, pair: wp.vec2i, edge: wp.array[float], d: Implicit, to: wp.array[wp.int64]
+):
     """Add an energy [J] to both bodies of a pair; as integers, their sum has no order."""
     for k in range(2):
-        if pair[k] < d.inv_total.shape[0]:
-            share = wp.float64(e) * wp.float64(d.inv_total[pair[k]])
-            wp.atomic_add(to, pair[k], wp.int64(wp.round(share * COUNTS)))
+        b = pair[k]
+        if b < d.inv_total.shape[0]:
+            way = wp.float64(h) / wp.float64(edge[b])
+            share = wp.float64(e) * wp.float64(d.inv_total[b]) * way * way
+            wp.atomic_add(to, b, wp.int64(wp.round(share * COUNTS)))
 
 
 @wp.kernel
@@ -129,6 +133,7 @@ def part(
     threads: int,
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
+    edge: wp.array[float],  # (n_body,) [m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     d: Implicit,
     # in, out
@@ -150,7 +155,7 @@ def part(
             s.taken += energy_taken(s.u, u, impulse[c], at.normal)
             s.u = u
             strike[c] = s
-            add_energy(s.back * s.taken, at.pair, d, most)
+            add_energy(s.back * s.taken, s.h, at.pair, edge, d, most)
             to.parting = s.speed
         constraint[c] = to
         impulse[c] = Impulse()
@@ -162,6 +167,7 @@ def add_given(
     threads: int,
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
+    edge: wp.array[float],  # (n_body,) [m]
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
     d: Implicit,
     impulse: wp.array[Impulse],  # (capacity,)
@@ -175,7 +181,7 @@ def add_given(
         if s.speed > 0.0:
             u = relative_velocity(contact[c], v) + s.kick
             e = -energy_taken(s.u, u, impulse[c], contact[c].normal)
-            add_energy(e, contact[c].pair, d, given)
+            add_energy(e, s.h, contact[c].pair, edge, d, given)
 
 
 @wp.kernel

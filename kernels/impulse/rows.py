@@ -110,8 +110,9 @@ def rigid_row_sum(
         arm += share.of_vert[j] * wp.length(x[j] - d.centre[b])
     c = d.inv_inertia[b]  # its norm is at most that of Frobenius
     norm = wp.sqrt(wp.ddot(c, c))
-    if not wp.isfinite(norm):  # its squares, of a tiny body: the trace is no less
-        norm = wp.trace(c)
+    if not wp.isfinite(norm):  # its squares, of a tiny body
+        scale = wp.trace(c)
+        norm = scale * wp.sqrt(wp.ddot(c / scale, c / scale))
     own = wp.length(x[i] - d.centre[b])
     return ROOM * (d.inv_total[b] * s + norm * own * arm)
 

@@ -38,6 +38,7 @@ class Strike:
     taken: float  # [J] E of the impulses that stopped it
     u: wp.vec3  # [m/s] before the impulses that come, at the time of the positions
     kick: wp.vec3  # [m/s] what forces add to u in half a step
+    h: float  # [s] the step
 
 
 @wp.func
@@ -82,6 +83,7 @@ def find_strikes(
             to.back = e * e
             to.u = last - kick
             to.kick = kick
+            to.h = h
             strike[c] = to
             constraint[c].friction = (1.0 + e) * constraint[c].friction
 

@@ -9,7 +9,7 @@ the impulses do; the last one is plain.
 import warp as wp
 
 from warp_contact.kernels.impulse.constraint import Constraint
-from warp_contact.kernels.impulse.impulse import clear_parts
+from warp_contact.kernels.impulse.impulse import agree, clear_parts
 from warp_contact.kernels.impulse.rows import row_weight
 from warp_contact.kernels.lengths import CLOSURE_TOLERANCE
 from warp_contact.kernels.narrow_phase.contact import Contact, gap
@@ -82,7 +82,7 @@ def solve_gaps(
         counted[c] = 1
         p = wp.max(ahead[c] - g / row_weight(at, row), 0.0)
         beta = float(0.0)
-        if not last and (ahead[c] - p) * (p - push[c]) <= 0.0:
+        if not last and not agree(ahead[c] - p, p - push[c]):
             beta = float(sweep - 1) / float(sweep + 2)
         next = p + beta * (p - push[c])
         for k in range(5):

@@ -158,6 +158,24 @@ def test_the_energy_of_a_pile_never_rises(rng):
         last = now
 
 
+@pytest.mark.parametrize("speed", [0.3, 1.0, 3.0])
+def test_a_body_of_ten_micrometres_bounces_as_a_larger_one(speed):
+    """Its energy and impulses, and their squares, are tiny in float32."""
+    found = []
+    for size in 1.0, 1e-5:
+        scene = wc.Scene(gravity=(0.0, 0.0, 0.0), restitution=1.0)
+        scene.add_body(wc.box(size, 1), SOLID, velocity=(0.0, 0.0, -speed * size))
+        for up in 1.0, -1.0:
+            scene.add_plane((0.0, 0.0, up), -0.6 * size)
+        sim = wc.Simulation(scene)
+        first = sim.measure().kinetic
+        for _ in sim.frames(60):
+            pass
+        found.append(sim.measure().kinetic / first)
+    assert max(found) < 1.0 + 1e-6
+    assert found[0] == pytest.approx(found[1], rel=1e-3)
+
+
 def test_what_bounces_comes_to_rest():
     sim = dropped(BOX, 0.5, height=0.1)
     for _ in sim.frames(60):

@@ -50,11 +50,12 @@ def _part(model: Model, state: State, work: Work) -> None:
     _record(state, work, at_end)
     d, outputs = work.implicit.bodies, [c.constraint, c.impulse, r.strike, r.most]
     r.most.zero_()
-    launch_over(kernels.part, m, inputs=[c.n, c.record, state.v, d], outputs=outputs)
+    given = [c.n, c.record, model.body_edge, state.v, d]
+    launch_over(kernels.part, m, inputs=given, outputs=outputs)
     _solve(model, state, at_end)
     for _ in range(ROUNDS):
         r.given.zero_()
-        inputs = [c.n, c.record, state.v, d, c.impulse, r.strike]
+        inputs = [*given, c.impulse, r.strike]
         launch_over(kernels.add_given, m, inputs=inputs, outputs=[r.given])
         inputs = [c.n, c.record, r.strike, r.most, r.given]
         launch_over(kernels.temper, m, inputs=inputs, outputs=[c.constraint])

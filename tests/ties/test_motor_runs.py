@@ -100,3 +100,19 @@ def test_the_force_of_an_arm_asleep_is_that_of_its_last_frame_awake():
     assert sim._stepper.sleeping.awake.bodies.numpy().tolist() == [0, 1]
     np.testing.assert_allclose(torque[-1], 0.03 * 9.81, rtol=2e-3)
     assert torque[-1] == torque[-2]
+
+
+@pytest.mark.parametrize(
+    "response", [wc.Penalty(1e4, 10.0), wc.VirtualSurface(1e4, 10.0), wc.PredictedForce()], ids=str
+)
+def test_other_responses_let_motors_act_too(response):
+    scene = wc.Scene(gravity=NONE)
+    wall = scene.add_body(BOX, SOLID, (0.12, 0.0, 0.0), fixed=True)
+    scene.add_body(BOX, SOLID)
+    held = scene.attach(1, kind="slider", at=NONE, axis=(1.0, 0.0, 0.0))
+    sim = wc.Simulation(scene, response)
+    sim.set_motor(held, 0.3, 5.0)
+    for _ in sim.frames(60):
+        pass
+    assert sim.motor_force(held) == pytest.approx(5.0, rel=1e-3)
+    assert sim.force_on(wall)[0] == pytest.approx(5.0, rel=0.02)

@@ -10,7 +10,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import penalty, predicted, virtual
-from warp_contact.step import broad_phase, impulse, residual, search
+from warp_contact.step import broad_phase, impulse, motors, residual, search
 from warp_contact.step.damping import damp_alone
 from warp_contact.step.detection import detect, detect_vertices
 from warp_contact.step.motion import explicit_part, finish, kick, predict
@@ -44,6 +44,8 @@ def step_penalty(
     if damping_stages > 0:
         damp_alone(explicit_part(model, work), state, work, damping_stages)
     kick(model, state, work, work.awake)
+    if work.ties and work.ties.driven:
+        motors.drive(model, state, work)
     broad_phase.refresh(model, state.x, state.x, work)
     detect(model, state.x, state.x, work)
     if_any(work.contacts.n, _push, model, state, work, response)

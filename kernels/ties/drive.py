@@ -15,7 +15,7 @@ from warp_contact.kernels.implicit.bodies import RIGID, Implicit, RigidMotion, a
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.ties.attachment import Attachments
 from warp_contact.kernels.ties.motor import Motors, axis_of, middle_of, speed_of
-from warp_contact.kernels.ties.solve import substitute
+from warp_contact.kernels.ties.solve import find_pulls
 from warp_contact.kernels.ties.tie import HELD, Ties, across
 
 wp.set_module_options(OPTIONS)
@@ -140,7 +140,7 @@ def respond(
                 y = across(y, as_vec3d(ties.line[t]))
             ties.pull[t] = y
             motors.y[motors.row[c] + k * n + t - ties.first[c]] = y
-        substitute(c, ties)
+        find_pulls(c, ties)
         for t in range(n):
             motors.z[motors.row[c] + k * n + t] = ties.pull[ties.first[c] + t]
     for k in range(m):

@@ -6,8 +6,12 @@
 G is the mobility of implicit/mobility.py as touched.py has it, without P: K is as good as J G J^T
 where bodies are little strained, and what is left is solved again. It has blocks of 3 x 3. Some
 ties say what others say, such as the length between two points of a rigid body; there K is
-singular, and a millionth of its diagonal is added, which costs another round. Where a tie slides,
-and where it is idle, a row keeps its diagonal alone.
+singular, and E, a millionth of its diagonal, is added, which costs another round. What they say
+against each other is rounding, of which a millionth would make huge impulses: there
+
+    p = (K + E)^-1 (r - E (K + E)^-1 r)
+
+leaves it out. Where a tie slides, and where it is idle, a row keeps its diagonal alone.
 """
 
 import warp as wp
@@ -27,6 +31,7 @@ from warp_contact.kernels.ties.tie import HELD, IDLE, Ties, across, direction, g
 wp.set_module_options(OPTIONS)
 
 ADDED = wp.constant(wp.float64(1.0e-6))  # part of the diagonal
+SINGULAR = wp.constant(wp.float64(1.0e-4))  # part of the diagonal that other ties leave
 
 
 @wp.func
@@ -179,6 +184,7 @@ def factorise(
     c = wp.tid()
     first = ties.block[c]
     n = ties.first[c + 1] - ties.first[c]
+    ties.singular[c] = 0
     for i in range(n):
         row = first + i * n
         for j in range(i + 1):
@@ -188,6 +194,11 @@ def factorise(
             for k in range(j):
                 s -= ties.matrix[row + k] @ wp.transpose(ties.matrix[other + k])
             if i == j:
-                ties.matrix[row + j] = lower(s + wp.diag(least), least)
+                l = lower(s + wp.diag(least), least)
+                ties.matrix[row + j] = l
+                ties.added[ties.first[c] + i] = least
+                for k in range(3):
+                    if l[k, k] * l[k, k] * SINGULAR * least[k] > ADDED:
+                        ties.singular[c] = 1
             else:
                 ties.matrix[row + j] = s @ wp.transpose(ties.matrix[other + j])

@@ -99,7 +99,7 @@ def find_changes(
 
 @wp.func
 def substitute(c: int, ties: Ties):
-    """K^-1 r in place of r in the pulls of cluster c."""
+    """(K + E)^-1 r in place of r in the pulls of cluster c."""
     first = ties.first[c]
     n = ties.first[c + 1] - first
     for i in range(n):
@@ -116,6 +116,18 @@ def substitute(c: int, ties: Ties):
         ties.pull[first + i] = wp.transpose(ties.matrix[ties.block[c] + i * n + i]) * s
 
 
+@wp.func
+def find_pulls(c: int, ties: Ties):
+    """K^-1 r in place of r in the pulls of cluster c."""
+    if ties.singular[c] != 0:
+        for t in range(ties.first[c], ties.first[c + 1]):
+            ties.asked[t] = ties.pull[t]
+        substitute(c, ties)
+        for t in range(ties.first[c], ties.first[c + 1]):
+            ties.pull[t] = ties.asked[t] - wp.cw_mul(ties.added[t], ties.pull[t])
+    substitute(c, ties)
+
+
 @wp.kernel
 def solve(
     # in
@@ -125,7 +137,7 @@ def solve(
 ):
     """One thread per cluster: what each tie adds, in place of r."""
     c = wp.tid()
-    substitute(c, ties)
+    find_pulls(c, ties)
     for t in range(ties.first[c], ties.first[c + 1]):
         s = ties.pull[t]
         ties.since[t] = ties.since[t] + s

@@ -65,6 +65,9 @@ class Ties:
     held: wp.array[wp.vec3d]  # (n_tie,) [N s] impulse of the step, on the first body
     moved: wp.array[int]  # (n_cluster,) 1 where anything changed its velocities
     matrix: wp.array[wp.mat33d]  # (n_block,) [1/kg] blocks below the diagonal, see matrix.py
+    added: wp.array[wp.vec3d]  # (n_tie,) [1/kg] what is added to its diagonal
+    asked: wp.array[wp.vec3d]  # (n_tie,) [y] r of a cluster whose matrix is singular
+    singular: wp.array[int]  # (n_cluster,) 1 where ties say what others say
 
 
 @wp.struct

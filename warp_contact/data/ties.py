@@ -153,8 +153,9 @@ def _ties(table: TieTable, broken: wp.array) -> Ties:
     ties.matrix = wp.zeros(int(blocks[-1]), dtype=wp.mat33d)
     ties.broken, ties.state = broken, wp.zeros(n, dtype=int)
     ties.soft = wp.zeros(n, dtype=wp.float64)
-    ties.pull, ties.since, ties.held, ties.before = (wp.zeros(n, dtype=wp.vec3d) for _ in range(4))
-    ties.moved = wp.zeros(len(sizes), dtype=int)
+    for name in ("pull", "since", "held", "before", "added", "asked"):
+        setattr(ties, name, wp.zeros(n, dtype=wp.vec3d))
+    ties.moved, ties.singular = (wp.zeros(len(sizes), dtype=int) for _ in range(2))
     return ties
 
 

@@ -115,8 +115,9 @@ def test_restitution_is_read_back(tmp_path):
     scene.add_plane((0.0, 0.0, 1.0), restitution=0.6)
     scene.add_body(MESH, wc.Rigid(1000.0), (0, 0, 0.1), restitution=0.8)
     scene.add_body(MESH, wc.Rigid(1000.0), (1, 0, 0.1))
+    scene.add_body(MESH, wc.Rigid(1000.0), (2, 0, 0.1), restitution=0.0)
     written(tmp_path / "run", scene, 1)
     found = wc.Scene.from_usd(tmp_path / "run")
     assert found.not_read == []
     assert found.restitution == 0.3
-    assert found.coefficients("restitution") == [0.8, 0.3, 0.6]
+    assert found.coefficients("restitution") == [0.8, 0.3, 0.0, 0.6]

@@ -102,9 +102,9 @@ def vectors(values: np.ndarray) -> Vt.Vec3fArray:
 class Materials:
     """Materials of a stage: each that bodies and planes share is written once."""
 
-    def __init__(self, stage):
-        """Of a stage that has a scope ``/World/Looks``."""
-        self._stage, self._known = stage, {}
+    def __init__(self, stage, bounces: bool):
+        """Of a stage that has a scope ``/World/Looks``; ``bounces`` where 0 has to be said."""
+        self._stage, self._bounces, self._known = stage, bounces, {}
 
     def bind(self, prim, friction: float, restitution: float, material=None) -> None:
         """Give a prim both coefficients, and what else a material says."""
@@ -124,7 +124,7 @@ class Materials:
         api = UsdPhysics.MaterialAPI.Apply(prim)
         api.CreateStaticFrictionAttr(friction)
         api.CreateDynamicFrictionAttr(friction)
-        if restitution:
+        if restitution or self._bounces:
             api.CreateRestitutionAttr(restitution)
         if material is None:
             return made

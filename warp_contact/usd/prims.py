@@ -143,7 +143,7 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
     UsdGeom.Scope.Define(stage, "/World/Looks")
     look = contact_look(stage)
     add_scene(stage, sim.scene)
-    physics, local = Materials(stage), x.copy()
+    physics, local = Materials(stage, sim.scene.restitution > 0.0), x.copy()
     for part, label, body in zip(parts, model.labels, sim.scene.bodies, strict=True):
         xform = UsdGeom.Xform.Define(stage, part.path)
         Usd.ModelAPI(xform).SetKind(Kind.Tokens.component)

@@ -1,5 +1,7 @@
 """contact_data.py: contacts, forces of pairs and of bodies, against momenta and closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import warp as wp
@@ -111,6 +113,37 @@ def test_contacts_add_up_also_where_the_closure_looked_for_others(device, kind):
             for got in (total, same):  # a frame is a step; sums in float32 of some weights
                 np.testing.assert_allclose(sign @ got, force, atol=1e-4 * WEIGHT)
     assert looks > 0
+
+
+@pytest.mark.parametrize("grows", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_contacts_stay_as_they_are_whatever_else_is_read(device, kind, grows, monkeypatch):
+    scene = wc.Scene(friction=0.3)
+    scene.add_plane((0.0, 0.0, 1.0))
+    soft = wc.NeoHookean(1e5, 0.3, DENSITY, 2e-3)
+    for k in range(2):
+        at = 0.01 * k, 0.013 * k, (k + 0.52) * EDGE
+        scene.add_body(wc.box(EDGE, 2), soft, at, velocity=(0.3, 0.0, -1.0))
+    sim = wc.Simulation(scene, integrator=kind, device=str(device))
+    kept, stepper = set(), sim._stepper
+    find = stepper._velocities
+
+    def outgrown():  # buffers are replaced, as where they are too small
+        room = stepper.work.capacity
+        stepper.buffers.replace(replace(room, contacts=room.contacts + 64))
+        stepper._start.go_back(stepper._state, stepper.work)
+        return find()
+
+    if grows:
+        monkeypatch.setattr(stepper, "_velocities", outgrown)
+    for _ in sim.frames(15):
+        kept.add(int(stepper.work.contacts.kept.n.numpy()[0]) >= 0)
+        before = sim.contacts()
+        sim.measure()
+        after = sim.contacts()
+        for name, values in vars(before).items():
+            np.testing.assert_array_equal(getattr(after, name), values, err_msg=name)
+    assert kept == {True, False}
 
 
 def test_contacts_of_two_bodies_have_two_sides(device):

@@ -8,6 +8,8 @@ from warp_contact.kernels.impulse.constraint import Constraint, Impulse
 from warp_contact.kernels.narrow_phase.contact import Contact
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
 
+READ = "n", "n_vertex", "record", "impulse"  # what is read between frames
+
 
 @dataclass
 class KeptContacts:
@@ -74,13 +76,16 @@ def allocate(n_vert: int, capacity: int, n_vertex: wp.array[int]) -> Contacts:
     )
 
 
-def copied(contacts: Contacts) -> tuple[wp.array, ...]:
-    """What is read of them between frames, in arrays of its own."""
-    return tuple(wp.clone(a) for a in (contacts.n, contacts.n_vertex, contacts.record))
+def copied(contacts: Contacts) -> tuple[dict[str, wp.array], KeptContacts]:
+    """What is read of them between frames, in arrays of its own; what is kept only steps change."""
+    return {name: wp.clone(getattr(contacts, name)) for name in READ}, contacts.kept
 
 
-def copy(to: Contacts, of: tuple[wp.array, ...]) -> None:
-    """Put back what was ``copied``; it fits."""
-    wp.copy(to.n, of[0])
-    wp.copy(to.n_vertex, of[1])
-    wp.copy(to.record, of[2], count=len(of[2]))
+def copy(to: Contacts, of: tuple[dict[str, wp.array], KeptContacts]) -> None:
+    """Put back what was ``copied``, also where buffers have been replaced; it fits."""
+    found, kept = of
+    for name, array in found.items():
+        wp.copy(getattr(to, name), array, count=len(array))
+    if to.kept is not kept:
+        for name, array in vars(kept).items():
+            wp.copy(getattr(to.kept, name), array, count=len(array))

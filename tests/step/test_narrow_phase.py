@@ -5,6 +5,7 @@ import pytest
 import warp as wp
 
 from warp_contact import NeoHookean, Scene, TetMesh, box
+from warp_contact.scene.scene import rotation_matrix
 from warp_contact.step import broad_phase, narrow_phase
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
@@ -104,3 +105,29 @@ def test_penetrations_are_sorted_by_vertex_and_body_with_planes_last(rng, stages
     )
     assert got == sorted(got) and len(got) > len(below) > 0
     assert {i for i, body in got if body == model.n_body} == set(below.tolist())
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.1])
+def test_a_vertex_that_goes_through_a_plate_meets_the_side_by_which_it_came(
+    stages, find_contacts, turn
+):
+    """Both bodies move in the step, the plate by a part of the way and turning."""
+    scene = Scene()
+    scene.add_body(box((2.0, 2.0, 0.02), (4, 4, 1)), RUBBER)
+    scene.add_body(box(0.5, 1), RUBBER, (0.11, 0.07, 0.5))
+    model, state, work = stages(scene)
+    x0 = state.x.numpy()
+    x1, plate = x0.copy(), model.vert_body.numpy() == 0
+    about = np.array([np.sin(turn / 2), 0.0, 0.0, np.cos(turn / 2)])
+    x1[plate] = x0[plate] @ rotation_matrix(about).T + (0.0, 0.0, -0.1)
+    x1[~plate, 2] -= 1.0  # the block, 0.5 high, lies below the plate then
+    moved = wp.array(x1.astype(np.float32), dtype=wp.vec3)
+    c = find_contacts(model, work, state.x, moved, apart=True)
+    of_block = c.pair[:, 0] == 1
+    assert {*c.vert[of_block, 0]} == {*np.flatnonzero(~plate)}
+    up = rotation_matrix(about)[:, 2]
+    np.testing.assert_allclose(c.normal[of_block], np.tile(up, (of_block.sum(), 1)), atol=1e-5)
+    gaps = np.einsum("ckx,ck,cx->c", x0[c.vert], c.coef, c.normal)[of_block]
+    assert (gaps > 0.2).all()  # they begin above it
+    # Where nothing moves there is nothing to find.
+    assert not (find_contacts(model, work, moved, apart=True).pair[:, 0] == 1).any()

@@ -58,11 +58,11 @@ def picture(s: Sweep, found: dict[str, list[list[str]]], path: Path) -> None:
     for ax, (method, grid) in zip(axes.flat, found.items(), strict=False):
         ax.set_title(method)
         panel(ax, s, grid)
-    legend = axes.flat[-1]
-    legend.axis("off")
     for outcome, colour in zip(OUTCOMES, COLOURS, strict=True):
-        legend.scatter([], [], s=120, marker="s", color=colour, edgecolor="grey", label=outcome)
-    legend.legend(loc="center", fontsize=10)
+        axes.flat[0].scatter(
+            [], [], s=120, marker="s", color=colour, edgecolor="grey", label=outcome
+        )
+    figure.legend(loc="outside lower center", ncols=len(OUTCOMES), fontsize=10)
     figure.savefig(path, dpi=100)
     plt.close(figure)
 

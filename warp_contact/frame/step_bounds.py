@@ -17,9 +17,10 @@ forces are explicit. They take
     n       = 2^k or 3 2^k >= max(stable, u_b / (STRIDE r_b), RESOLVED) / fps
 
 so that few lengths of steps are in use, each with inverses of its own. u_b is the largest speed of
-anything against body b, r_b its thickness, or more where it does not deform (reach.py). Where some
-bodies take explicit steps beside them, omega, t and e are theirs, passing and gentle count too, and
-n is no smaller than in the last frame unless KEEP of the smaller number would do.
+anything against body b, r_b its thickness, or more where it does not deform (reach.py). RESOLVING
+replaces RESOLVED while there may be overlaps older than the step. Where some bodies take explicit
+steps beside them, omega, t and e are theirs, passing and gentle count too, and n is no smaller than
+in the last frame unless KEEP of the smaller number would do.
 """
 
 import numpy as np
@@ -37,6 +38,7 @@ PATIENCE = 2.0  # times the stable number of steps: more are not taken for TRAVE
 BLURRED = 1.05  # times the stable step: its uncertainty
 RESOLVED = 240.0  # implicit steps [1/s] at least: longer ones damp what a frame shows
 ONE_PASS = 1920.0  # implicit steps [1/s] at least, where contacts are looked at once a step
+RESOLVING = 3840.0  # the same while overlaps last: longer ones turn what is stored into motion
 STRIDE = 0.5  # as REACH, in implicit steps
 LEAP = 0.6  # of the thinnest body: as REACH, in a step that the user chose; 0.68 lets some pass
 # Of the last frame's steps, at least: a step that follows a vibration pumps energy into it.
@@ -68,14 +70,14 @@ def steps_in_frame(per_second, fps: float, last):
     return np.maximum(np.maximum(1, kept), np.ceil(per_second / fps)).astype(int)
 
 
-def implicit_steps(explicit, crossing, fps: float, rate: float = RESOLVED, last=0):
+def implicit_steps(explicit, crossing, fps: float, rate=RESOLVED, last=0):
     """Whole implicit steps in a frame.
 
     Args:
         explicit: steps [1/s] that explicit bodies, a penalty and a frame that failed need, else 0
         crossing: largest speed against a body, over its reach [1/s]
         fps: frames a second
-        rate: steps [1/s] at least
+        rate: steps [1/s] at least, of each world or of all
         last: steps of the last frame where bodies take explicit ones, else 0
     """
     per_second = np.maximum(np.maximum(explicit, crossing / STRIDE), rate)

@@ -87,7 +87,9 @@ class StepCount:
         n = step_bounds.steps_in_frame(per_second, self.fps, last.n)
         if self._implicit:
             crossing, before = self._crossing(state), np.where(self._mixed, last.n, 0)
-            given = per_second, crossing, self.fps, self._rate, before
+            lasts = (last.overlapping > 0) & ~self._leaves
+            rate = np.where(lasts, step_bounds.RESOLVING, self._rate)
+            given = per_second, crossing, self.fps, rate, before
             n = step_bounds.implicit_steps(*given).astype(int)
             per_second = np.maximum(per_second, crossing / step_bounds.STRIDE)
         w = int(n.argmax())

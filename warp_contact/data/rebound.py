@@ -39,7 +39,7 @@ def allocate(n_vert: int, n_body: int, contacts: Contacts, worlds: Worlds) -> Re
     """Allocate for the contacts and worlds of a step, whose other arrays are shared."""
     n = len(contacts.record)
     own = Worlds()
-    for name in Worlds.vars:
+    for name in Worlds.vars:  # type: ignore[attr-defined]
         setattr(own, name, getattr(worlds, name))
     own.open = wp.zeros_like(worlds.open)
     return Rebound(

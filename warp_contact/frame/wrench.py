@@ -93,7 +93,8 @@ class Wrench:
 
     def clear(self) -> None:
         """Nothing acts, as before the first frame."""
-        self.restore(*np.zeros((2, *self._last.shape)), np.zeros(len(self.driven)))
+        nothing = np.zeros((2, *self._last.shape))
+        self.restore(nothing[0], nothing[1], np.zeros(len(self.driven)))
 
     def values(self) -> dict[str, np.ndarray]:
         """What a checkpoint needs."""

@@ -65,11 +65,10 @@ class Contacts:
 
 def contacts(state: State, work: Work, dt: np.ndarray) -> Contacts:
     """Those of the last step at the present positions; ``dt`` are the steps [s], (n_vert,)."""
-    of, n = work.contacts, int(work.contacts.kept.n.numpy()[0])
+    n = int(work.contacts.kept.n.numpy()[0])
+    of = work.contacts if n < 0 else work.contacts.kept
     if n < 0:
         n = int(of.n.numpy()[0])
-    else:
-        of = of.kept
     record, impulse = (a.numpy()[:n] for a in (of.record, of.impulse))
     made = (record["coef"] != 0.0).any(axis=1)
     record, impulse = record[made], impulse[made]

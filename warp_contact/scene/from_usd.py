@@ -49,8 +49,8 @@ def fill(scene, path, at, material) -> None:
         except ValueError as error:
             said.append(f"{info['path']}: {error}")
     for plane in found["planes"]:
-        own = plane["friction"], plane["restitution"]
-        scene.add_plane(plane["normal"], plane["offset"], *own)
+        given = plane["normal"], plane["offset"], plane["friction"], plane["restitution"]
+        scene.add_plane(*given)
     scene.not_read = [*said, *found["only_seen"]]
     if said:
         more = f" and {len(said) - 1} more, see scene.not_read" if len(said) > 1 else ""

@@ -104,7 +104,8 @@ class Materials:
 
     def __init__(self, stage, bounces: bool):
         """Of a stage that has a scope ``/World/Looks``; ``bounces`` where 0 has to be said."""
-        self._stage, self._bounces, self._known = stage, bounces, {}
+        self._stage, self._bounces = stage, bounces
+        self._known: dict[tuple, UsdShade.Material] = {}
 
     def bind(self, prim, friction: float, restitution: float, material=None) -> None:
         """Give a prim both coefficients, and what else a material says."""

@@ -157,7 +157,8 @@ def topology(parts: list[Part], sim, tets: bool, view: tuple | None) -> Sdf.Laye
         if tets:
             mesh = add_tets(stage, part, model, local)
             add_body(xform, mesh, body, part.is_rigid)
-            physics.bind(mesh, *rubs[part.index], body.material)
+            friction, bounce = rubs[part.index]
+            physics.bind(mesh, friction, bounce, body.material)
     taken = {Sdf.Path(part.path).name for part in parts} | {*TAKEN}
     planes = zip(model.plane_n.numpy(), model.plane_h.numpy(), rubs[len(parts) :], strict=True)
     for n, h, both in planes:

@@ -77,6 +77,17 @@ def find_rigid_part(
     rigid_motion(b, total, turning, d, motion)
 
 
+@wp.func
+def find_motion(
+    b: int, y: wp.array[wp.vec3], x: wp.array[wp.vec3], d: Implicit, motion: RigidMotion
+):
+    """Set the rigid part of velocities y [m/s] of body b, which has no fixed vertices."""
+    if d.kind[b] == RIGID:
+        find_solid_motion(b, y, x, d, motion)
+    else:
+        find_rigid_part(b, y, x, d, motion)
+
+
 @wp.kernel
 def rigid_response(
     # in
@@ -104,12 +115,8 @@ def rigid_part(
 ):
     """One thread per body without fixed vertices: the rigid part of velocities."""
     b = wp.tid()
-    if not moves(b, d) or not floats(b, d):
-        return
-    if d.kind[b] == RIGID:
-        find_solid_motion(b, y, x, d, motion)
-    else:
-        find_rigid_part(b, y, x, d, motion)
+    if moves(b, d) and floats(b, d):
+        find_motion(b, y, x, d, motion)
 
 
 @wp.kernel

@@ -32,6 +32,12 @@ INSIDE = wp.constant(-1.0)  # in place of a distance until a vertex may penetrat
 THROUGH = wp.constant(-2.0)  # the same, of one that went through the body
 SWEPT = wp.constant(0.5)  # of the thickness of a body: a longer motion in a step may go through it
 
+# Where a vertex lies against the triangles of the body next to it.
+UNSURE = wp.constant(0)
+ABOVE = wp.constant(1)
+BELOW = wp.constant(2)
+BEYOND = wp.constant(3)  # it went through the body
+
 
 @wp.func
 def distance(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3) -> float:
@@ -136,13 +142,6 @@ def went_through(
     return entry.start >= -STALE_OVERLAP * edge
 
 
-# Where a vertex lies against the triangles of the body next to it.
-UNSURE = wp.constant(0)
-ABOVE = wp.constant(1)
-BELOW = wp.constant(2)
-BEYOND = wp.constant(3)  # it went through the body
-
-
 @wp.struct
 class Penetration:
     """A vertex inside a body, or one that went through it; depth.py finds its depth."""
@@ -193,12 +192,13 @@ def find_penetrations(
             margin = VERTEX_MARGIN * mesh.body_edge[body]
             clear = clearance(x[i], margin, pairs.items[c], pairs.item, mesh.tets, x)
             inside = clear <= 0.0
-            t = mesh.tets[pairs.item[pairs.items[c][0]]]
-            way = wp.length(x[i] - x0[i] - (x[t[0]] - x0[t[0]]))
-            if clear > 0.0 and way > wp.max(SWEPT * thickness[body], clear):
-                if went_through(i, body, clear, mesh, x0, x):
-                    inside = True
-                    clear_until[c] = THROUGH
+            if not inside:
+                t = mesh.tets[pairs.item[pairs.items[c][0]]]
+                way = wp.length(x[i] - x0[i] - (x[t[0]] - x0[t[0]]))
+                if way > wp.max(SWEPT * thickness[body], clear):
+                    if went_through(i, body, clear, mesh, x0, x):
+                        inside = True
+                        clear_until[c] = THROUGH
         if inside:
             is_inside[c] = 1
         else:

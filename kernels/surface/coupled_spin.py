@@ -24,8 +24,7 @@ from warp_contact.kernels.implicit.bodies import (
     floats,
     moves,
 )
-from warp_contact.kernels.implicit.masses import find_solid_motion
-from warp_contact.kernels.implicit.mobility import find_rigid_part
+from warp_contact.kernels.implicit.mobility import find_motion
 from warp_contact.kernels.impulse.impulse import clear_parts
 from warp_contact.kernels.impulse.rows import Touched
 from warp_contact.kernels.narrow_phase.contact import Contact, meets_body
@@ -65,10 +64,7 @@ def find_spin(
     b = wp.tid()
     if not moves(b, d) or not floats(b, d):
         return
-    if d.kind[b] == RIGID:
-        find_solid_motion(b, v, x, d, motion)
-    else:
-        find_rigid_part(b, v, x, d, motion)
+    find_motion(b, v, x, d, motion)
     spin[b] = spin_of(b, x, v, d, motion)
 
 

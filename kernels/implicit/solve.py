@@ -2,8 +2,9 @@
 
     A(x) dv = r,   A = M + h C(x) + h^2 K(x)                                          [kg]
 
-The mobility G of mobility.py is the preconditioner. A is indefinite where tets are pressed hard;
-a body ends where a direction of negative curvature comes up. In free flight r is what rounding of
+The mobility G of mobility.py is the preconditioner. A is indefinite where tets are pressed hard.
+A body ends where a direction comes up along which A is less than LEAST of M: the curvature there is
+negative, or so near to 0 that dv would have no bound. In free flight r is what rounding of
 positions by ROUNDING |x| does to forces, about (1 / G_ii - m_i) / h for each vertex: a body ends
 where r . G r is no larger than that.
 
@@ -22,6 +23,7 @@ wp.set_module_options(OPTIONS)
 TOLERANCE = wp.constant(1.0e-3)  # of the first residual, in the norm of G
 ROUNDING = wp.constant(2.5e-7)  # of a coordinate, in float32, and what follows from it
 NEAR = wp.constant(0.1)  # part of r . G r that is left: less, and G is almost the inverse of A
+LEAST = wp.constant(wp.float64(0.5))  # of p . M p: with a smaller p . A p a body ends
 ITERATIONS = wp.constant(16)  # at most: two are usual
 
 
@@ -127,8 +129,11 @@ def go(
     first = d.body_vert[b]
     last = d.body_vert[b + 1]
     curvature = inner(p, ap, first, last)
+    inertia = wp.float64(0.0)
+    for i in range(first, last):
+        inertia += wp.float64(d.mass[i] * wp.length_sq(p[i]))
     along = float(0.0)
-    if curvature > wp.float64(0.0):
+    if curvature > LEAST * inertia:
         along = wp.float32(to.now[b] / curvature)
     else:
         if to.going[b] == 1:

@@ -60,6 +60,8 @@ def main() -> int:
         env = {"WARP_CACHE_PATH": folder}
         shutil.copytree(kernels, Path(folder) / kernels.name)
         chosen = [c for c in changes(tree) if only in f"{c['file']} {c['kind']} {c['test']}"]
+        if not chosen:
+            parser.error(f"no change has {only!r} in its file, kind or test")
         if not passes(tree, *sorted({c["test"] for c in chosen}), **env):
             raise RuntimeError("a test fails without any change")
         for change in chosen:

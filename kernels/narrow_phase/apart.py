@@ -22,7 +22,7 @@ class Apart:
     """What separates the edges and the triangles of all pairs, since these were found."""
 
     gap: wp.array[float]  # (pairs,) [m] least one along the axes when they were found, 0 without
-    axis: wp.array[int]  # (items,) of each triangle
+    axis: wp.array[wp.int8]  # (items,) of each triangle
 
 
 @wp.func
@@ -54,11 +54,11 @@ def pair_clearance(
         gap = float(0.0)
         t = tris[tri[k]]
         if least > 0.0:
-            gap = gap_along_kept(apart.axis[k], t, x, p, q)
+            gap = gap_along_kept(int(apart.axis[k]), t, x, p, q)
         if least == 0.0 or gap < least:
             found = separation(p, q, t, enough, x)
             gap = found.gap
-            apart.axis[k] = found.axis
+            apart.axis[k] = wp.int8(found.axis)
             anew = True
         if not gap > 0.0:
             apart.gap[pair] = 0.0

@@ -51,7 +51,7 @@ def test_what_separated_an_edge_before_is_found_again_and_hides_no_crossing(rng)
     tris = wp.array(np.arange(corners).reshape(-1, 3), dtype=wp.vec3i)
     apart = Apart()
     apart.gap = wp.zeros(N, dtype=float)
-    apart.axis = wp.zeros(TRIS * N, dtype=int)
+    apart.axis = wp.zeros(TRIS * N, dtype=wp.int8)
     out = wp.zeros(N, dtype=float)
     crossings, kept = 0, 0
     for _ in range(40):

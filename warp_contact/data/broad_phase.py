@@ -77,7 +77,8 @@ class BroadPhase:
         beside: triangles beside the former, as long
         any_pair: whether there are any, shape (1,)
         n_found: length of the list that is being filled, shape (1,)
-        vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,)
+        vert_tet, edge_tri: what was found in any order, shapes (capacity.tets,), (capacity.tris,):
+            one after the other, in the same memory
         near: the bodies that may touch a body
         near_tri: triangles in the slabs of near bodies, shape (capacity.near,)
         lower, upper: boxes of the bodies [m], shape (n_body,)
@@ -123,6 +124,7 @@ def allocate(model: Model, x: wp.array[wp.vec3], capacity: Capacity) -> BroadPha
     """Allocate without any pair; the Bvhs are built around ``x``."""
     n, n_body = model.n_vert, model.n_body
     trees = _trees(model, x)
+    found = wp.zeros(max(capacity.tets, capacity.tris), dtype=wp.vec2i)
     return BroadPhase(
         x=wp.zeros(n, dtype=wp.vec3),
         free=wp.zeros(n_body, dtype=float),
@@ -139,8 +141,8 @@ def allocate(model: Model, x: wp.array[wp.vec3], capacity: Capacity) -> BroadPha
         beside=_beside(capacity),
         any_pair=wp.zeros(1, dtype=int),
         n_found=wp.zeros(1, dtype=int),
-        vert_tet=wp.zeros(capacity.tets, dtype=wp.vec2i),
-        edge_tri=wp.zeros(capacity.tris, dtype=wp.vec2i),
+        vert_tet=found[: capacity.tets],
+        edge_tri=found[: capacity.tris],
         near_tri=wp.zeros(capacity.near, dtype=int),
         key=wp.zeros(n, dtype=int),
         cell_start=wp.zeros(2 * n + 2, dtype=int),
@@ -208,7 +210,7 @@ def _pairs(model: Model, n_owner: int, n_pair: int, n_item: int) -> Pairs:
 def _apart(capacity: Capacity) -> Apart:
     apart = Apart()
     apart.gap = wp.zeros(capacity.edges, dtype=float)
-    apart.axis = wp.zeros(capacity.tris, dtype=int)
+    apart.axis = wp.zeros(capacity.tris, dtype=wp.int8)
     return apart
 
 

@@ -170,11 +170,6 @@ def test_an_unknown_integrator_is_refused():
         one_block(integrator="verlet")
 
 
-def test_auto_takes_implicit_steps_where_a_body_is_stiff():
-    assert "explicit steps" in one_block(integrator="auto", modulus=1e4).summary()
-    assert "implicit steps" in one_block(integrator="auto", modulus=1e9).summary()
-
-
 def test_the_steps_of_a_frame_come_from_a_short_list():
     found = {int(implicit_steps(0.0, u, 60.0)) for u in np.geomspace(1.0, 2000.0, 200)}
     assert found == {4, 6, 8, 12, 16, 24, 32, 48, 64, 96}

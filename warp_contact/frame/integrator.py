@@ -2,8 +2,9 @@
 
 An explicit step has to be shorter than the fastest vibration of the stiffest tet, an implicit one
 not. It costs more, damps vibrations that it does not resolve, and needs the inverse of a matrix for
-each shape. Where steps are implicit, bodies too large for that take explicit ones beside the
-others: their frequency then sets how many steps their world takes.
+each shape. It gets shorter where bodies are fast: the choice reckons with their speed at the start
+and with a fall through their world. Where steps are implicit, bodies too large for that take
+explicit ones beside the others: their frequency then sets how many steps their world takes.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from warp_contact.data.state import State
 from warp_contact.frame import implicit_shapes, step_bounds
 from warp_contact.frame.implicit_shapes import mobile, too_large
 from warp_contact.frame.spectrum import Spectrum
+from warp_contact.frame.worlds import Worlds
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 KINDS = "explicit", "implicit", "auto"
@@ -93,16 +95,42 @@ def _cheaper(model: Model, state: State) -> Integrator:
     """The kind of steps that takes less time."""
     spectrum, large = Spectrum(model), too_large(model)
     spectrum.rates(state.x)
-    of_bodies = spectrum.of_bodies[0] / (2.0 * step_bounds.SAFETY)
-    per_second, stiffest = float(of_bodies.max()), model.labels[int(of_bodies.argmax())]
+    speed = _speeds(model, state)
+    stable = spectrum.of_bodies[0] / (2.0 * step_bounds.SAFETY)
+    of_bodies = np.maximum(stable, speed / (step_bounds.REACH * model.body_thickness.numpy()))
+    per_second, thing = float(of_bodies.max()), model.labels[int(of_bodies.argmax())]
     n, dear = np.where(mobile(model), np.diff(model.body_vert.numpy()), 0), np.inf
     if n.any():
-        taken = max(step_bounds.RESOLVED, of_bodies[large].max(initial=0.0))
+        passing = speed[n > 0] / (step_bounds.STRIDE * model.body_thickness.numpy()[n > 0])
+        taken = max(step_bounds.RESOLVED, passing.max(), of_bodies[large].max(initial=0.0))
         dear = np.average(np.where(large, BESIDE, DEARER + n / DENSE), weights=n) * taken
     implicit = per_second > dear
-    why = f"body '{stiffest}' would need {per_second:.0f} explicit steps a second"
+    why = f"body '{thing}' would need {per_second:.0f} explicit steps a second"
     why = f"{why}, as dear as implicit ones from {dear:.0f} on"
     return Integrator(implicit, why + _beside(model) if implicit else why)
+
+
+def _speeds(model: Model, state: State) -> np.ndarray:
+    """Speed against each body that its world may come to [m/s], (n_body,): at the start, by a fall.
+
+    The fall is one through the height of the world, down to its floor. A body that is alone is
+    passed by nothing, and passes no floor.
+    """
+    x, v = state.x.numpy().astype(np.float64), state.v.numpy().astype(np.float64)
+    g, worlds = model.g.numpy()[0].astype(np.float64), Worlds(model)
+    down = g / max(float(np.linalg.norm(g)), 1e-30)
+    along = np.column_stack([v, x @ down])
+    most, least = np.full((2, worlds.n, 4), -np.inf)
+    np.maximum.at(most, worlds.of_vert, along)
+    np.maximum.at(least, worlds.of_vert, -along)
+    for n, h in zip(model.plane_n.numpy(), model.plane_h.numpy(), strict=True):
+        if n @ down < 0.0:
+            floor = along[:, 3] - (x @ n - h) / (n @ down)
+            np.maximum.at(most[:, 3], worlds.of_vert, floor)
+    extent = most + least
+    speed = np.linalg.norm(extent[:, :3], axis=1) + np.sqrt(2.0 * (g @ down) * extent[:, 3])
+    alone = np.bincount(worlds.of_body) == 1
+    return np.where(alone, 0.0, speed)[worlds.of_body]
 
 
 def _rigid(model: Model) -> str | None:

@@ -3,10 +3,12 @@
     W = M G M^T - (J G M^T)^T K^-1 (J G M^T),   u = M v                  of the motors of a cluster
     W dp = s + l - u,   |p + dp| <= h F                                          [N s], [N m s]
 
-s is the speed asked for, F the limit, J and K those of the ties (matrix.py). So W is what motors
-feel of all that hangs together; dp is found by Gauss and Seidel (projected). p starts from the
-force of the last step. Contacts come later in the step and find p as it is: the limit holds
-whatever is in the way. What they took from u in the last step, l, is asked for in this one.
+s is the speed asked for, or with a target the one that leads there in this step; F is the limit, J
+and K are those of the ties (matrix.py). So W is what motors feel of all that hangs together; dp is
+found by Gauss and Seidel (projected). p starts from the force of the last step. Contacts come later
+in the step and find p as it is: the limit holds whatever is in the way. What they took from u in
+the last step, l, is asked for in this one. Towards a target s is no faster than BRAKING of the
+limit could stop before it.
 """
 
 import warp as wp
@@ -14,12 +16,13 @@ import warp as wp
 from warp_contact.kernels.implicit.bodies import RIGID, Implicit, RigidMotion, as_vec3d
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.ties.attachment import Attachments
-from warp_contact.kernels.ties.motor import Motors, axis_of, middle_of, speed_of
+from warp_contact.kernels.ties.motor import Motors, axis_of, middle_of, place_of, speed_of
 from warp_contact.kernels.ties.solve import find_pulls
 from warp_contact.kernels.ties.tie import HELD, Ties, across
 
 wp.set_module_options(OPTIONS)
 
+BRAKING = wp.constant(0.5)  # part of the limit that slows down towards a target
 SWEEPS = wp.constant(32)  # over the motors of a cluster
 
 # What a round does.
@@ -205,7 +208,15 @@ def drive(
             motors.to[a] = h * wp.clamp(motors.force[a], -most, most)
         else:
             u = speed_of(a, motors.axis[a], of, motors, ties, v, x, d, motion)
-            motors.lacks[a] = motors.speed[a] + motors.lost[a] - u
+            asked = motors.speed[a]
+            if not wp.isnan(motors.target[a]):
+                motors.place[a] = place_of(a, of, motors, ties, x)
+                h = dt[ties.vert[of.tie[of.first[a]]][0]]
+                left = motors.target[a] - motors.place[a]
+                brakes = motors.limit[a] * wp.float32(motors.w[motors.block[c] + k * m + k])
+                most = wp.min(wp.abs(asked), wp.sqrt(BRAKING * 2.0 * brakes * wp.abs(left)))
+                asked = wp.clamp(left / h, -most, most)
+            motors.lacks[a] = asked + motors.lost[a] - u
             motors.to[a] = motors.p[a]
     if round == FURTHER:
         for _ in range(SWEEPS):

@@ -2,7 +2,9 @@
 
     u = (v_a - v_b) . e  at the axis of a slider,  (w_a - w_b) . e  of a hinge      [m/s], [1/s]
 
-e is the axis as it lies. drive.py has their impulses.
+e is the axis as it lies. drive.py has their impulses. The place q of a slider is C . e, by tie.py.
+That of a hinge is the angle about e from a vertex of the second body to one of the first, less that
+at the start; of the angles that differ by whole turns it is the one nearest to the last place.
 """
 
 import warp as wp
@@ -32,6 +34,11 @@ class Motors:
     lacks: wp.array[float]  # [m/s], [1/s] s + l - u
     turns: wp.array[int]  # 1 for a hinge
     speed: wp.array[float]  # [m/s], [1/s] s
+    target: wp.array[float]  # [m], [rad] q to be reached at a speed up to s, nan for none
+    place: wp.array[float]  # [m], [rad] q when the last step began that asked for it
+    mark: wp.array[wp.vec2i]  # vertices away from the axis of a hinge, -1 for the world
+    toward: wp.array[wp.vec3]  # what stands for the second where that is the world
+    turned: wp.array[float]  # [rad] the angle at the start
     limit: wp.array[float]  # [N], [N m] F, 0 where there is no motor
     force: wp.array[float]  # [N], [N m] in the last step, along e on the first body
     p: wp.array[float]  # [N s], [N m s] in this step
@@ -132,6 +139,49 @@ def speed_of(
         return tied_speed(a, e, of, ties, v)
     turning = spin_of(of.body[a][0], v, x, d, motion) - spin_of(of.body[a][1], v, x, d, motion)
     return wp.dot(turning, e)
+
+
+@wp.func
+def arm_of(i: int, p: wp.vec3d, e: wp.vec3d, x: wp.array[wp.vec3]) -> wp.vec3d:
+    """The way [m] from an axis through p to vertex i."""
+    r = as_vec3d(x[i]) - p
+    return r - wp.dot(r, e) * e
+
+
+@wp.func
+def place_of(a: int, of: Attachments, motors: Motors, ties: Ties, x: wp.array[wp.vec3]) -> float:
+    """The place q of an attachment [m], [rad]."""
+    t = of.tie[of.first[a]]
+    if motors.turns[a] == 0:
+        c = wp.vec3d()
+        for k in range(8):
+            c += wp.float64(ties.weight[t][k]) * as_vec3d(x[ties.vert[t][k]])
+        return wp.float32(wp.dot(c - as_vec3d(ties.point[t]), direction(t, ties, x)))
+    e = as_vec3d(axis_of(a, of, motors, ties, x))
+    p = point_of(t, ties, x)
+    one = arm_of(motors.mark[a][0], p, e, x)
+    other = as_vec3d(motors.toward[a])
+    if motors.mark[a][1] >= 0:
+        other = arm_of(motors.mark[a][1], p, e, x)
+    angle = wp.atan2(wp.dot(e, wp.cross(other, one)), wp.dot(other, one))
+    turn = wp.float64(2.0 * wp.pi)
+    more = angle - wp.float64(motors.turned[a]) - wp.float64(motors.place[a])
+    return motors.place[a] + wp.float32(more - turn * wp.round(more / turn))
+
+
+@wp.kernel
+def find_places(
+    # in
+    x: wp.array[wp.vec3],  # (n_vert,) [m]
+    of: Attachments,
+    motors: Motors,
+    ties: Ties,
+    # out
+    place: wp.array[float],  # (n_attachment,) [m], [rad] 0 of those that are no hinge or slider
+):
+    """One thread per hinge or slider: its place."""
+    a = motors.which[wp.tid()]
+    place[a] = place_of(a, of, motors, ties, x)
 
 
 @wp.kernel

@@ -7,7 +7,7 @@ from warp_contact.data.tie_table import TieTable
 from warp_contact.kernels.implicit.bodies import RigidMotion
 from warp_contact.kernels.ties.motor import Motors
 
-KEPT = "speed", "limit", "force", "lost", "sum"  # what a checkpoint needs
+KEPT = "speed", "target", "place", "limit", "force", "lost", "sum"  # what a checkpoint needs
 
 
 def allocate(table: TieTable, n_body: int) -> Motors:
@@ -28,7 +28,12 @@ def allocate(table: TieTable, n_body: int) -> Motors:
     motors.w = wp.zeros(int(number @ number), dtype=wp.float64)
     motors.axis, motors.at = (wp.zeros(n, dtype=wp.vec3) for _ in range(2))
     motors.turns = wp.array([int(kind == "hinge") for kind in table.kind], dtype=int)
-    for name in ("speed", "limit", "force", "p", "to", "lacks", "reached", "lost"):
+    motors.mark, motors.toward = (
+        wp.array(a, dtype=t) for a, t in ((table.marks, wp.vec2i), (table.toward, wp.vec3))
+    )
+    motors.turned = wp.array(table.turned, dtype=float)
+    scalars = "speed", "target", "place", "limit", "force", "p", "to", "lacks", "reached", "lost"
+    for name in scalars:
         setattr(motors, name, wp.zeros(n, dtype=float))
     motors.sum = wp.zeros(n, dtype=wp.float64)
     motors.by = RigidMotion()

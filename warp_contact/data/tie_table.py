@@ -14,6 +14,10 @@ class TieTable:
         body: both bodies of each attachment, -1 for the world, shape (n_attachment, 2)
         limit: force that breaks it [N], shape (n_attachment,)
         kind: of each attachment, as it was asked for
+        marks: a vertex of each body away from the axis of a hinge, -1 for the world, else -1,
+            shape (n_attachment, 2)
+        toward: from the axis of a hinge on the world to its mark at the start, (n_attachment, 3)
+        turned: angle from the second mark to the first at the start [rad], shape (n_attachment,)
         attachment: whose each tie is, shape (n_tie,)
         cluster: its cluster, shape (n_tie,)
         first: first tie of each cluster, shape (n_cluster + 1,)
@@ -27,6 +31,9 @@ class TieTable:
     body: np.ndarray
     limit: np.ndarray
     kind: tuple[str, ...]
+    marks: np.ndarray
+    toward: np.ndarray
+    turned: np.ndarray
     attachment: np.ndarray
     cluster: np.ndarray
     first: np.ndarray

@@ -10,7 +10,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.tie_table import TieTable
 from warp_contact.kernels.implicit.bodies import RigidMotion
 from warp_contact.kernels.ties.attachment import Attachments, Partners
-from warp_contact.kernels.ties.motor import Motors
+from warp_contact.kernels.ties.motor import Motors, find_places
 from warp_contact.kernels.ties.rows import Rows
 from warp_contact.kernels.ties.tie import Tied, Ties, vec8, vec8i
 
@@ -56,6 +56,13 @@ class TieWork:
         """Put back what was ``copied``."""
         for name, array in self._kept().items():
             wp.copy(array, kept[name])
+
+    def places(self, x: wp.array) -> wp.array:
+        """Where hinges [rad] and sliders [m] are, 0 for others, shape (n_attachment,); new."""
+        out = wp.zeros(self.n_attachment, dtype=float)
+        inputs = [x, self.attachments, self.motors, self.ties]
+        wp.launch(find_places, len(self.motors.which), inputs=inputs, outputs=[out])
+        return out
 
     def values(self) -> dict[str, np.ndarray]:
         """What a checkpoint needs."""

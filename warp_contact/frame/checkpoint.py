@@ -10,7 +10,7 @@ from numpy.lib.recfunctions import repack_fields
 from warp_contact.data.model import Model
 from warp_contact.files import replacing
 
-FORMAT = 11
+FORMAT = 12
 
 
 def fingerprint(model: Model, *settings) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from warp_contact import checks
 from warp_contact.data.tie_table import TieTable
 from warp_contact.scene.body import Body
+from warp_contact.scene.hinge_marks import marks_of
 from warp_contact.scene.materials import Rigid
 from warp_contact.scene.topology import HUGE
 
@@ -144,6 +145,7 @@ def lay_out(attachments: Sequence[Attachment], bodies: Sequence[Body]) -> TieTab
         body=np.array([(a.a.index, a.b.index if a.b else -1) for a in attachments]),
         limit=np.array([a.breaking_force or np.inf for a in attachments]),
         kind=tuple(a.kind for a in attachments),
+        **marks_of(attachments, start),
         attachment=whose,
         cluster=cluster,
         first=np.concatenate([[0], np.cumsum(number)]),

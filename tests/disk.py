@@ -3,9 +3,12 @@
 import errno
 import os
 import shutil
+import threading
 from pathlib import Path
 
 from pxr import Sdf
+
+from warp_contact.usd import writer
 
 CHANGES = ("fsync", "replace", "rename", "unlink", "mkdir", "rmdir")
 
@@ -23,6 +26,7 @@ class Full:
             (os, "mkdir"),
             (Sdf.Layer, "Export"),
             (Path, "write_text"),
+            (writer, "renew"),
         ):
             monkeypatch.setattr(owner, name, self._limited(getattr(owner, name)))
 
@@ -48,18 +52,19 @@ class Kills:
     def __init__(self, monkeypatch, folder: Path, copies: Path):
         """Until ``monkeypatch`` is undone."""
         self.folder, self.place, self.copies, self.done, self.said = folder, copies, [], [], None
-        self._is_copying = False
+        self._is_copying, self._lock = False, threading.RLock()  # many wait for the disk at once
         for name in CHANGES:
             monkeypatch.setattr(os, name, self._watched(getattr(os, name)))
 
     def _watched(self, whole):
         def watched(*args, **options):
-            if self.folder.exists() and not self._is_copying:
-                self.copies.append(self.place / f"kill{len(self.copies)}" / self.folder.name)
-                self.done.append(self.said)
-                self._is_copying = True
-                shutil.copytree(self.folder, self.copies[-1])
-                self._is_copying = False
+            with self._lock:
+                if self.folder.exists() and not self._is_copying:
+                    self.copies.append(self.place / f"kill{len(self.copies)}" / self.folder.name)
+                    self.done.append(self.said)
+                    self._is_copying = True
+                    shutil.copytree(self.folder, self.copies[-1])
+                    self._is_copying = False
             return whole(*args, **options)
 
         return watched

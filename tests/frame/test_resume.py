@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from command_line import blocks, complaint
 from disk import Full
 
+from warp_contact import files
 from warp_contact.command import cli, run
 from warp_contact.simulation import Simulation
 from warp_contact.usd import reader
@@ -182,6 +183,28 @@ def test_another_start_velocity_does_not_resume(tmp_path, thrown, capsys):
     assert cli.main([*command, "--quiet"]) == 0
     assert cli.main([*command, "--resume", "--set", "speed=9.0"]) == 2
     assert "placed or moved otherwise" in complaint(capsys)
+
+
+def test_frames_are_on_the_disk_before_a_checkpoint_that_counts_on_them(
+    tmp_path, thrown, monkeypatch
+):
+    monkeypatch.setattr(run, "SAVE_EVERY", 0.0)
+    on_disk, saved, save, sync = set(), [], Simulation.save, files.sync
+
+    def watched_sync(path):
+        sync(path)
+        on_disk.add(path.name)
+
+    def watched_save(sim, path):
+        # The first is published, with all that is beside it, before another one.
+        wanted = {f"f.{frame:06d}.usdc" for frame in range(sim.frame + 1)} | {run.METRICS}
+        saved.append(sim.frame == 0 or wanted <= on_disk)
+        save(sim, path)
+
+    monkeypatch.setattr(files, "sync", watched_sync)
+    monkeypatch.setattr(Simulation, "save", watched_save)
+    command = ["run", thrown, "--frames", "3", "--quiet", "--out", str(tmp_path / "out")]
+    assert cli.main(command) == 0 and saved == 4 * [True]
 
 
 @pytest.mark.parametrize("k", [*range(1, 60, 6), 1000])

@@ -101,7 +101,8 @@ def take_frames(sim: Simulation, n: int, writer: UsdWriter, args) -> None:
             line.expect(sim.next_substeps())
         if not args.resume:  # all of it appears together, over another run not before frame 1
             text = line_of(sim, sim.measure())
-            append(folder.now / METRICS, text)
+            append(folder.now / METRICS, text, wait=False)
+            folder.wrote(folder.now / METRICS)
             sim.save(folder.now / CHECKPOINT)
             writer.write(text, publish=not folder.replaces)
         last = time.monotonic()
@@ -109,10 +110,12 @@ def take_frames(sim: Simulation, n: int, writer: UsdWriter, args) -> None:
             measured = sim.measure()
             text = line_of(sim, measured)
             writer.write(text)
-            append(folder.now / METRICS, text)
+            append(folder.now / METRICS, text, wait=False)
+            folder.wrote(folder.now / METRICS)
             line.update(sim, measured)
             interrupts.check()
             if frame == n or time.monotonic() - last >= SAVE_EVERY:
+                writer.sync()  # what the checkpoint counts on
                 sim.save(folder.now / CHECKPOINT)
                 last = time.monotonic()
 

@@ -11,18 +11,53 @@ The hidden ones are gone after a run. What a killed one left of them, the next o
 
 import os
 import shutil
+import time
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
 from pxr import Sdf, Tf
 
-from warp_contact.files import HIDDEN, sync
+from warp_contact.files import HIDDEN, sync, sync_all
 from warp_contact.usd.lock import Lock
 from warp_contact.usd.reader import root_path, roots_in
 
 NEW, READY = f"{HIDDEN}new", f"{HIDDEN}ready"
 TOPOLOGY = "topology.usdc"
+SYNC_EVERY = 1.0  # what the power of the machine may take of a run [s]
+# Of the same length at each frame, so that it can be renewed in place: to replace a file by another
+# one takes three times as long, and where the disk is busy milliseconds.
+ROOT = """#usda 1.0
+(
+    defaultPrim = "World"
+    endTimeCode = {end:<8}
+    framesPerSecond = {fps}
+    kilogramsPerUnit = 1
+    metersPerUnit = 1
+    startTimeCode = {start}
+    subLayers = [
+        @./topology.usdc@
+    ]
+    timeCodesPerSecond = {fps}
+    upAxis = "Z"
+)
+
+over "World" (
+    clips = {{
+        dictionary default = {{
+            asset manifestAssetPath = @./manifest.usdc@
+            string primPath = "/World"
+            string templateAssetPath = "./frames/f.######.usdc"
+            double templateEndTime = {end:<8}
+            double templateStartTime = {start}
+            double templateStride = 1
+        }}
+    }}
+)
+{{
+}}
+
+"""
 
 
 class RunFolder:
@@ -52,6 +87,7 @@ class RunFolder:
         """
         self.root = root_path(path)
         folder = self.root.parent
+        self._late, self._synced = dict[Path, None](), time.monotonic()
         self._made = [p for p in (folder, *folder.parents) if not p.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -75,10 +111,23 @@ class RunFolder:
         """Whether files may be written."""
         return self._lock.release.alive
 
+    def wrote(self, *paths: Path) -> None:
+        """Know files that are not on the disk yet."""
+        for path in paths:
+            self._late |= {path: None, path.parent: None}
+
+    def sync(self, every: float = 0.0) -> None:
+        """Put them on the disk, unless that was done less than so long ago [s]."""
+        if time.monotonic() - self._synced >= every:
+            sync_all(self._late)
+            self._late.clear()
+            self._synced = time.monotonic()
+
     def publish(self) -> None:
         """Put the new run, as far as it is written, in the place of what is there."""
         folder = self.root.parent
         if self.now != folder:
+            self.sync()
             os.rename(self.now, folder / READY)
             self.now = folder
             finish(folder)
@@ -86,6 +135,8 @@ class RunFolder:
     def close(self) -> None:
         """Let others have the folder; what was not published is removed."""
         if self.is_open:
+            with suppress(OSError):
+                self.sync()
             with suppress(OSError):  # what cannot be done now, the next one does
                 clear(self.root.parent)
             self._lock.release()

@@ -1,6 +1,7 @@
 """The prims of a USD file that do not change during a run: bodies, tets, materials, half-spaces."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, Vt
@@ -44,7 +45,7 @@ class Part:
     color: np.ndarray
     rest: np.ndarray | None
 
-    @property
+    @cached_property
     def surface(self) -> str:
         """Its surface: Blender shows a Mesh by its own name, not by that of the Xform above."""
         return f"{self.path}/{Sdf.Path(self.path).name}"

@@ -1,13 +1,14 @@
 """USD output that survives the end of its process.
 
-    <dir>/<name>.usda           root: metadata and the clip range, rewritten after each frame
+    <dir>/<name>.usda           root: metadata and the clip range, renewed after each frame
     <dir>/topology.usdc         prims, faces, tets, materials: once
     <dir>/manifest.usdc         which attributes the frames carry: once
     <dir>/frames/f.000012.usdc  what changes: one file a frame
 
-Each file is written under another name, put on the disk and renamed, a frame before the root that
-counts it. So at any moment the root names finished frames only, and all of them. The files appear,
-or take the place of those of an earlier run, together with the first frame.
+Each file is written under another name and renamed, a frame before the root counts it. So at any
+moment the root names finished frames only, and all of them. The files appear, or take the place of
+those of an earlier run, together with the first frame. They are put on the disk about once a second
+and at the end: only the power of the machine can take what was not.
 
 Of a rigid body the prim moves, and its points are written once, in the frame of its mesh.
 
@@ -17,16 +18,17 @@ rounded to a thousandth of their largest value on the body, to a 250th on those 
 some more, so that they pack to half the size. Colours are indices into a palette.
 """
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from pxr import Sdf, Tf, UsdGeom, Vt
 
-from warp_contact.files import replacing
+from warp_contact.files import renew, replacing, sync_all
 from warp_contact.usd.attachments import Attachments
 from warp_contact.usd.contacts import ContactArrows
 from warp_contact.usd.fields import field_types, field_values, hydrostatic
-from warp_contact.usd.folder import TOPOLOGY, RunFolder, frame_file, frame_files
+from warp_contact.usd.folder import ROOT, SYNC_EVERY, TOPOLOGY, RunFolder, frame_file, frame_files
 from warp_contact.usd.kept import check_frames, check_layers, first_frame
 from warp_contact.usd.motion import motion, motion_types, numbers, velocities, velocity_types
 from warp_contact.usd.prims import check_options, parts, shades, topology
@@ -100,6 +102,7 @@ class UsdWriter:
         try:
             self.renders = renders(self.parts, self.sim)
             self.grows, self.layer = self.scale == 0.0, self._declare()
+            self.path = cache(Sdf.Path)  # to make one takes as long as to set its value
             if self.arrows:
                 self.arrows.define(prims)
             self.attachments.define(prims)
@@ -128,7 +131,8 @@ class UsdWriter:
         """Close; after an error what was written stays and nothing is flattened."""
         if kind is None:
             self.close()
-        self.folder.close()
+        else:
+            self.folder.close()
 
     def write(self, note: str = "", publish: bool = True) -> None:
         """Write the state of the simulation as frame ``sim.frame``, and ``note`` in its file.
@@ -140,24 +144,37 @@ class UsdWriter:
             raise ValueError(f"{self.root} is closed: no frame can be written any more")
         if self.end is not None and frame != self.end + 1:
             raise ValueError(f"frame {frame} cannot follow frame {self.end}")
-        for path, value in self._values():
-            if self.end is not None:
-                self.layer.EraseTimeSample(path, self.end)
-            self.layer.SetTimeSample(path, frame, value)
+        values = list(self._values())
+        with Sdf.ChangeBlock():
+            for path, value in values:
+                if self.end is not None:
+                    self.layer.EraseTimeSample(self.path(path), self.end)
+                self.layer.SetTimeSample(self.path(path), frame, value)
         lengths = {"forceScale": self.arrows.scale} if self.arrows else {}
         self.layer.customLayerData = {"pressureScale": self.scale, "note": note} | lengths
-        export(self.layer, frame_file(self.folder.now, frame))
+        path = frame_file(self.folder.now, frame)
+        export(self.layer, path, wait=False)
         start = frame if self.start is None else self.start
         self._write_root(start, frame)
+        self.folder.wrote(path, self.folder.now / self.root.name)
         if publish:
             self.folder.publish()
+        self.folder.sync(SYNC_EVERY)
         self.start, self.end = start, frame
 
+    def sync(self) -> None:
+        """Put all frames on the disk now, as before a checkpoint that counts on them."""
+        self.folder.sync()
+
     def close(self) -> None:
-        """Flatten, if asked to, and let others have the folder."""
-        if self.flatten and self.end is not None and self.folder.is_open:
-            export(open_stage(self.root).Flatten(), self.root.with_suffix(".usdc"))
-        self.folder.close()
+        """Put all on the disk, flatten, if asked to, and let others have the folder."""
+        try:
+            if self.folder.is_open:
+                self.folder.sync()
+            if self.flatten and self.end is not None and self.folder.is_open:
+                export(open_stage(self.root).Flatten(), self.root.with_suffix(".usdc"))
+        finally:
+            self.folder.close()
 
     def _check(self) -> None:
         """See that the earlier file, up to the frame of the simulation, is what it should be."""
@@ -177,6 +194,7 @@ class UsdWriter:
     def _cut(self) -> None:
         """Make the earlier file end at the frame of the simulation."""
         self._write_root(self.start, self.end)
+        sync_all((self.root, self.root.parent))
         self.root.with_suffix(".usdc").unlink(missing_ok=True)
         for path in frame_files(self.root.parent):
             if path > frame_file(self.root.parent, self.end):
@@ -227,25 +245,7 @@ class UsdWriter:
 
     def _write_root(self, start: int, end: int) -> None:
         """Make the root layer name the frames."""
-        layer = Sdf.Layer.CreateAnonymous(".usda")
-        layer.subLayerPaths.append("./topology.usdc")
-        layer.defaultPrim = "World"
-        layer.timeCodesPerSecond = layer.framesPerSecond = self.sim.fps
-        layer.startTimeCode, layer.endTimeCode = start, end
-        for key, value in ("upAxis", "Z"), ("metersPerUnit", 1.0), ("kilogramsPerUnit", 1.0):
-            layer.pseudoRoot.SetInfo(key, value)
-        world = Sdf.CreatePrimInLayer(layer, "/World")
-        clips = {
-            "templateAssetPath": "./frames/f.######.usdc",
-            "templateStartTime": float(start),
-            "templateEndTime": float(end),
-            "templateStride": 1.0,
-            "manifestAssetPath": Sdf.AssetPath("./manifest.usdc"),
-            "primPath": "/World",
-        }
-        world.SetInfo("clips", {"default": clips})
-        with replacing(self.folder.now / self.root.name) as part:
-            part.write_text(layer.ExportToString(), encoding="utf-8")
+        renew(self.folder.now / self.root.name, ROOT.format(start=start, end=end, fps=self.sim.fps))
 
 
 def declare(layer: Sdf.Layer, attributes: dict) -> None:
@@ -255,9 +255,9 @@ def declare(layer: Sdf.Layer, attributes: dict) -> None:
         Sdf.AttributeSpec(Sdf.CreatePrimInLayer(layer, prim), name, kind)
 
 
-def export(layer: Sdf.Layer, path: Path) -> None:
+def export(layer: Sdf.Layer, path: Path, wait: bool = True) -> None:
     """Write a layer so that ``path`` is either absent, old or complete."""
-    with replacing(path) as part:
+    with replacing(path, wait) as part:
         try:
             is_written, reason = layer.Export(str(part)), "USD does not say why"
         except Tf.ErrorException as error:  # each of its lines ends with : 'what went wrong'

@@ -33,6 +33,7 @@ so that other processes on the machine hardly count; those of frames and starts 
 spheres of which N pairs touch; what contact adds to a step beyond that of ``pairs_0`` is about
 ``pairs.any_ms + N pairs.each_ms``. ``sleep`` are frames of 32 blocks in 16 columns: while they
 settle, at rest, and asleep, with how far sleep let them come from where they else are [edges].
+``writer`` are frames of scenes and what a ``UsdWriter`` takes for each, in the folder of the call.
 ``start.import_s`` is the import of the package; ``start.warm_frame_s`` and ``start.cold_frame_s``
 are the first frame after it, the scene included, with and without kernels compiled before.
 """
@@ -43,14 +44,15 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
 import numpy as np
-from clock.figures import figures, sleep_figures, start_times
+from clock.figures import figures, sleep_figures, start_times, writer_figures
 from clock.scenes import FRACTION, PAIRS, Case, cases
 from measure import machine
 from measure.run import command_line, count, one_of
 
 from warp_contact.frame.integrator import KINDS
 
-OTHERS = {"sleep": sleep_figures, "start": start_times}  # cases with figures of their own
+# cases with figures of their own
+OTHERS = {"sleep": sleep_figures, "writer": writer_figures, "start": start_times}
 
 
 def main() -> int:

@@ -6,14 +6,14 @@ import subprocess
 import sys
 import tempfile
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 from unittest import mock
 
 import numpy as np
 import warp as wp
 
 import warp_contact as wc
-from clock.scenes import Case, blocks
+from clock.scenes import FRACTION, Case, blocks, cases
 from clock.window import Timing, measure
 
 START = """
@@ -28,6 +28,8 @@ print(imported - begin, perf_counter() - imported)
 STARTS = 3  # with kernels that are compiled already
 SETTLING, REST, LONG, SAMPLE = 20, 40, 900, 20  # frames of the blocks that fall asleep
 SHOWN_FRAMES = 3  # of which the median gives the frames per second
+WRITTEN = "two_bodies", "cubes_on_membrane", "squeezed_sphere", "bowl"  # from their starts
+WRITTEN_FRAMES = 60
 BOUND = 90.0, 150.0, 1000.0  # ns that a tet, a surface vertex, a contact with its sweeps may take
 
 
@@ -117,6 +119,25 @@ def sleep_figures(device: str | None) -> dict[str, float]:
     found = {name: 1e3 * median(t) for name, t in zip(names, times, strict=True)}
     apart = np.abs(awake.positions() - asleep.positions()).max() / awake.model.body_edge.numpy()[0]
     return found | {"frames_until_all_sleep": until, "moved": float(apart)}
+
+
+def writer_figures(device: str | None) -> dict[str, float]:
+    """What frames and the writing of them cost, in turns [ms], and what the second adds."""
+    found = {}
+    for name, case in ((n, c) for n, c in cases(False, FRACTION).items() if n in WRITTEN):
+        sim, spent = wc.Simulation(case.build(), device=device), np.zeros((2, 2))
+        sim.step_frame()
+        with tempfile.TemporaryDirectory(dir=".") as folder, wc.UsdWriter(folder, sim) as usd:
+            for _ in range(WRITTEN_FRAMES):
+                for row, act in zip(spent, (sim.step_frame, usd.write), strict=True):
+                    begin = process_time(), perf_counter()
+                    act()
+                    row += np.subtract((process_time(), perf_counter()), begin)
+        frame, write = 1e3 * spent / WRITTEN_FRAMES
+        for clock, f, w in zip(("cpu", "wall"), frame, write, strict=True):
+            found |= {f"{name}.frame_{clock}_ms": f, f"{name}.write_{clock}_ms": w}
+            found[f"{name}.{clock}_added"] = w / f
+    return found
 
 
 def start_times(device: str | None) -> dict[str, float]:

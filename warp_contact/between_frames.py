@@ -87,7 +87,8 @@ class BetweenFrames:
             self._moves.end(self._at(body, chosen), self.state)
             self._stepper.set_positions(x, self._bodies.range(body))
             own = self.model.vert_body.numpy()[self._bodies.range(body)]
-            self._meter.tunnelling.jump(self.state.x, own[0], own[-1])
+            placed = np.isin(np.arange(self.model.n_body), own)
+            self._meter.tunnelling.jump(self.state.x, placed)
 
     def set_velocity(self, body: Body | int | str, velocity, vertices=None) -> None:
         """Set velocities [m/s] between frames; fixed vertices keep theirs from then on.

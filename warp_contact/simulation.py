@@ -16,6 +16,7 @@ from warp_contact.frame.integrator import KINDS as INTEGRATORS
 from warp_contact.frame.integrator import choose
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.moves import Moves
+from warp_contact.frame.some_worlds import begin_anew
 from warp_contact.frame.stepper import Stepper
 from warp_contact.frame.surroundings import Surroundings
 from warp_contact.joined import Joined
@@ -173,13 +174,12 @@ class Simulation(BetweenFrames, ContactData, Joined):
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Begin anew: the next frames give the bits of the first ones.
 
-        With ``worlds``, bodies in these alone are put where they began; ``frame`` and others go on,
+        With ``worlds``, these alone begin anew, with the same bits too; ``frame`` and others go on,
         and gravity, friction and restitution stay.
 
         Raises:
             ValueError: no body is in one of the worlds
         """
-        x, v = self._stepper.first
         if worlds is None:
             with exclusively(self.device):
                 self._stepper.reset()
@@ -190,24 +190,22 @@ class Simulation(BetweenFrames, ContactData, Joined):
                 self._meter = Meter(self.model)
             self.frame = 0
             return
-        own = self.model.body_world.numpy()
-        for world in worlds:
-            if not (own == world).any():
+        of_body, stepper = self.model.body_world.numpy(), self._stepper
+        chosen = list(worlds)
+        for world in chosen:
+            if not (of_body == world).any():
                 raise ValueError(f"no body is in world {world!r}")
-            for body in np.flatnonzero(own == world):
-                part = self._bodies.range(int(body))
-                self._stepper.wrench.forget(int(body))
-                self._mend(int(body))
-                self.set_positions(int(body), x[part])
-                self.set_velocity(int(body), v[part])
-
-    def _mend(self, body: int) -> None:
-        """Let the attachments of a body hold as at the start, without motors."""
-        if self.model.ties:
-            own = (self.model.ties.body == body).any(axis=1)
-            with exclusively(self.device):
-                self._stepper.work.ties.mend(own)
-                self._stepper.wrench.driven[own] = 0.0
+        own = np.isin(of_body, chosen)
+        with exclusively(self.device):
+            self._meter.tunnelling.follow(self.state.x)
+            self._moves.end(np.flatnonzero(own[self.model.vert_body.numpy()]), self.state)
+            begin_anew(stepper, self.model, self.state, np.isin(np.unique(of_body), chosen))
+            self._meter.tunnelling.jump(self.state.x, own)
+            stepper.wrench.forget(own)
+            if self.model.ties:
+                joined = own[self.model.ties.body[:, 0]]
+                stepper.work.ties.mend(joined)
+                stepper.wrench.driven[joined] = 0.0
 
     def measure(self) -> Measure:
         """Energies, momenta, overlap, contacts and contact forces of the last frame."""

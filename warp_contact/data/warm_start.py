@@ -51,6 +51,20 @@ def forget(warm: WarmStart, lacking: bool = True) -> None:
         warm.lacking.zero_()
 
 
+def forget_at(warm: WarmStart, verts: np.ndarray, edges: np.ndarray) -> None:
+    """The same for some vertices and edges, masks."""
+    arrays = [warm.lacking] if len(warm.lacking) else []
+    for array, nothing in (warm.partner, -1), *((a, 0.0) for a in arrays):
+        kept = array.numpy().copy()
+        kept[verts] = nothing
+        array.assign(kept)
+    found = warm.edges.numpy()[: int(warm.n_edge.numpy()[0])]
+    left = found[~edges[found["edge"]]]
+    warm.n_edge.fill_(len(left))
+    if len(left):
+        wp.copy(warm.edges, wp.array(left, dtype=EdgeContact), count=len(left))
+
+
 def copied(warm: WarmStart) -> WarmStart:
     """The same in arrays of its own."""
     return WarmStart(*(wp.clone(array) for array in vars(warm).values()))

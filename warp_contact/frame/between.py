@@ -13,6 +13,7 @@ from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.step.velocity import answer_of, shift_velocities, velocities_now
 
 ROUNDS = 24  # of halving what is left of a velocity
+ROUNDING = 1e-7  # of the largest velocity: less is not left
 
 
 def velocities(
@@ -53,7 +54,10 @@ def set_velocities(
     for _ in range(ROUNDS):  # what half a step adds depends on the velocity, by less than itself
         now = State(state.x, wp.array(v, dtype=wp.vec3))
         shift_velocities(model, now, work, awake, 0.5 * dt)
-        v[at] += values - now.v.numpy()[at]
+        left = values - now.v.numpy()[at]
+        v[at] += left
+        if np.abs(left).max(initial=0.0) <= ROUNDING * np.abs(v).max():
+            break
     state.v.assign(v)
 
 

@@ -151,6 +151,14 @@ class Spectrum:
         if self._at is not None:
             self._remember(wp.array(self._at, dtype=wp.vec3))
 
+    def forget(self, of: np.ndarray) -> None:
+        """Let the next call begin as the first one in the worlds ``of``, a mask."""
+        own = of[self.worlds.of_vert, None]
+        for start in self._start.values():
+            start.assign(np.where(own, np.float32(np.nan), start.numpy()))
+        self._of_bodies = np.where(of[self.worlds.of_body], np.inf, self._of_bodies)
+        self.flat = self.flat & ~of
+
     def starts(self) -> dict[str, np.ndarray]:
         """What the next calls start from."""
         starts = {apply.__name__: start.numpy() for apply, start in self._start.items()}

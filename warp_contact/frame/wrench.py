@@ -87,9 +87,9 @@ class Wrench:
         if self._shapes:
             self._assign(self._last)
 
-    def forget(self, body: int) -> None:
-        """Nothing is to act on a body in the next frame."""
-        self._next[:, body] = 0.0
+    def forget(self, bodies: np.ndarray) -> None:
+        """Nothing is to act on bodies, a mask, in the next frame."""
+        self._next[:, bodies] = 0.0
 
     def clear(self) -> None:
         """Nothing acts, as before the first frame."""

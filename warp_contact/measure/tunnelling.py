@@ -65,12 +65,12 @@ class Tunnelling:
             own = model.vert_body.numpy()[self._ends.numpy()[through[-1], 0]]
             self.pair = self._names[own], self._names[body[through[-1]]]
 
-    def jump(self, x: wp.array, first: int, last: int) -> None:
-        """Continue from ``x``; bodies ``first`` to ``last`` were placed there without motion."""
+    def jump(self, x: wp.array, placed: np.ndarray) -> None:
+        """Continue from ``x``; bodies ``placed``, a mask, were put there without motion."""
         own = self._model.vert_body.numpy()[self._ends.numpy()[:, 0]]
         entered, deep = self._entered.numpy(), self._deep.numpy()
         into = np.where(entered < 0, -1, self._model.tri_body.numpy()[entered])
-        anew = (first <= own) & (own <= last) | (first <= into) & (into <= last)
+        anew = placed[own] | ((into >= 0) & placed[into])
         self._entered.assign(np.where(anew, np.int32(-1), entered))
         self._deep.assign(np.where(anew, np.int32(0), deep))
         wp.copy(self._last, x)

@@ -20,6 +20,7 @@ from warp_contact.step import sweeps, ties
 from warp_contact.step.implicit import place
 
 TOLERANCE = 1e-4  # of an edge: an approach in a step that needs another sweep
+FINER = 1e-5  # the same where bodies are strained, and move anew in each step: else they creep
 SWEEPS = 100  # at most: a heavy body on a light one needs most
 PASSES = 40  # at most
 

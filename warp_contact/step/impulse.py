@@ -60,14 +60,23 @@ def begin(model: Model, x0: wp.array, work: Work) -> None:
     _begin(model, x0, work, work.narrow_phase.none)
 
 
-def exchange(model: Model, v: wp.array, work: Work, look: int = NO_LOOK) -> None:
+def exchange(
+    model: Model,
+    v: wp.array,
+    work: Work,
+    look: int = NO_LOOK,
+    keeps: bool = True,
+    finer: bool = False,
+) -> None:
     """Change ``v`` by normal impulses and friction until no contact approaches.
 
     Only in worlds where the ``look`` found an overlap, or in all with ``NO_LOOK``. The contacts of
-    edges are kept, with their impulses, for the next step.
+    edges are kept, with their impulses, for the next step, if it ``keeps`` them. Those of implicit
+    steps may be solved ``finer``.
     """
-    _sweep_all(model, v, work, look)
-    warm_start.keep_edges(work, look)
+    _sweep_all(model, v, work, look, finer)
+    if keeps:
+        warm_start.keep_edges(work, look)
 
 
 def solve_half_step(model: Model, state: State, work: Work) -> None:
@@ -81,7 +90,7 @@ def solve_half_step(model: Model, state: State, work: Work) -> None:
     warm_start.recall_edges(work, share)
     warm_start.recall_vertices(work, share)
     apply(model, state.v, work)
-    _sweep_all(model, state.v, work, NO_LOOK)
+    exchange(model, state.v, work, keeps=False)
 
 
 def apply(model: Model, v: wp.array, work: Work) -> None:
@@ -108,9 +117,10 @@ def add_forces(x: wp.array, work: Work) -> None:
     )
 
 
-def _sweep_all(model: Model, v: wp.array, work: Work, look: int) -> None:
+def _sweep_all(model: Model, v: wp.array, work: Work, look: int, finer: bool) -> None:
     if work.implicit:
-        return coupled.sweep_all(model, v, work, look, _limits().extrapolation)
+        tolerance = coupled.FINER if finer else coupled.TOLERANCE
+        return coupled.sweep_all(model, v, work, look, _limits().extrapolation, tolerance)
     sweeps.repeat(work, look, True, _sweep, model, v, work)
 
 

@@ -20,6 +20,7 @@ from warp_contact.step.detection import detect
 from warp_contact.step.motion import kick
 from warp_contact.step.other_responses import push_half_step
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
+from warp_contact.step.settle import settle
 from warp_contact.step.ties import hold_still
 
 
@@ -72,10 +73,16 @@ def _answer_apart(model: Model, now: State, work: Work) -> None:
     work.worlds.apart.fill_(1)
     narrow_phase.find_vertices(model, now.x, work.x, work)
     narrow_phase.continue_edges(model, now.x, work)
-    if_any(work.contacts.n, impulse.solve_half_step, model, now, work)
+    if_any(work.contacts.n, _answer_contacts, model, now, work)
 
 
 def _answer(model: Model, now: State, work: Work) -> None:
     work.worlds.apart.zero_()
     detect(model, now.x, now.x, work)
-    if_any(work.contacts.n, impulse.solve_half_step, model, now, work)
+    if_any(work.contacts.n, _answer_contacts, model, now, work)
+
+
+def _answer_contacts(model: Model, now: State, work: Work) -> None:
+    impulse.solve_half_step(model, now, work)
+    if work.implicit and work.implicit.any_deforming:
+        settle(model, now, work, keeps=False)

@@ -264,3 +264,27 @@ def test_a_kernel_of_a_user_reads_the_contacts(device):
     c = sim.contacts()
     want = (c.normal_force[:, None] * c.normal + c.friction_force).sum(axis=0)
     np.testing.assert_allclose(total.numpy()[0], want, atol=1e-5 * WEIGHT)  # sums in any order
+
+
+def test_a_pair_is_found_in_either_order_and_a_wrong_label_is_no_pair_that_did_not_touch():
+    scene = wc.Scene()
+    scene.add_plane((0.0, 0.0, 1.0))
+    rubber = wc.NeoHookean(1e5, 0.3, 1000.0)
+    for k, label in enumerate(("low", "high", "far")):
+        place = (0.5 * (k == 2), 0.0, 0.0501 + 0.1002 * k)
+        scene.add_body(wc.box(0.1, 1), rubber, place, label=label)
+    sim = wc.Simulation(scene)
+    for _ in sim.frames(12):
+        pass
+    forces = sim.forces()
+    one, other = forces["low", "high"], forces["high", "low"]
+    assert one.total[2] < 0.0
+    np.testing.assert_array_equal(other.total, -one.total)
+    np.testing.assert_array_equal(other.point, one.point)
+    assert ("plane0", "low") in forces and ("low", "far") not in forces
+    assert forces.get(("plane0", "low")).total[2] < 0.0 and forces.get(("far", "low")) is None
+    with pytest.raises(KeyError, match="'far' and 'low' did not touch"):
+        forces["far", "low"]
+    for wrong in forces.__getitem__, forces.get:
+        with pytest.raises(KeyError, match="no body or plane 'hihg': the scene has low, high"):
+            wrong(("low", "hihg"))

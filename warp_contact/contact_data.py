@@ -48,11 +48,13 @@ class ContactData:
                 self._rows = ContactRows(capacity, self.model.n_vert)
             return self._rows.fill(self.state, s.work, s.last_dt)
 
-    def forces(self) -> dict[tuple[str, str], contact_data.PairForce]:
+    def forces(self) -> contact_data.PairForces:
         """Mean contact force of the last frame on the first body of each pair that touched.
 
         The pairs are named as in ``measure().forces``, in the order in which bodies were added,
         planes last; each has ``normal`` and ``friction`` [N] and the ``point`` of the first [m].
+        One that is asked for in the other order has its forces turned round; ``get(pair)`` is None
+        where a pair did not touch, and a label that is none of the scene's a KeyError.
         """
         return contact_data.pair_forces(self._meter.names, self._stepper.work, self._duration)
 

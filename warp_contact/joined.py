@@ -54,9 +54,13 @@ class Joined:
             target: as ``attachment_position`` has it [m], [rad]; None for none
 
         Raises:
-            ValueError: there is no such attachment, it has no axis, or a number is out of range
+            ValueError: there is no such attachment, it has no axis or does not hold, or a number is
+                out of range
         """
         which = self._with_axis(attachment, "a motor drives a hinge or a slider")
+        if limit and not self.is_attached(attachment):
+            label = self.model.ties.labels[which]
+            raise ValueError(f"attachment '{label}' is broken or let go: its motor has no hold")
         velocity = checks.number(velocity, "velocity", -checks.FASTEST, checks.FASTEST)
         limit = checks.number(limit, "limit", least=0.0)
         goal = np.nan

@@ -135,3 +135,11 @@ def test_what_has_no_place_and_no_speed_is_refused_by_name():
     weld = scene.attach(0, kind="weld", label="glue", at=NONE)
     with pytest.raises(ValueError, match="'glue' is a weld: only a hinge or a slider"):
         wc.Simulation(scene).attachment_position(weld)
+
+
+def test_a_motor_without_hold_is_refused_but_may_be_switched_off():
+    sim, held = on_slider()
+    sim.detach(held)
+    with pytest.raises(ValueError, match="'attachment0' is broken or let go"):
+        sim.set_motor(held, 1.0, 1.0)
+    sim.set_motor(held, 0.0, 0.0)

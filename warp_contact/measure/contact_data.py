@@ -28,6 +28,39 @@ class PairForce(NamedTuple):
         return self.normal + self.friction
 
 
+class PairForces(dict[tuple[str, str], PairForce]):
+    """Forces of the pairs that touched, by the labels of both, in the order of ``names``.
+
+    A pair that is asked for in the other order is found too, with its forces turned round.
+    """
+
+    def __init__(self, names: list[str]):
+        """No pair touched yet."""
+        super().__init__()
+        self._names = names
+
+    def __missing__(self, pair: tuple[str, str]) -> PairForce:
+        """That of the pair in the other order; KeyError where it did not touch."""
+        first, second = pair
+        for name in pair:
+            if name not in self._names:
+                known = ", ".join(self._names)
+                raise KeyError(f"there is no body or plane '{name}': the scene has {known}")
+        turned = dict.get(self, (second, first))
+        if turned is None:
+            raise KeyError(f"'{first}' and '{second}' did not touch: get(pair) gives None there")
+        return PairForce(-turned.normal, -turned.friction, turned.point)
+
+    def __contains__(self, pair: object) -> bool:
+        """Whether a pair touched, in either order."""
+        both = isinstance(pair, tuple) and len(pair) == 2
+        return super().__contains__(pair) or (both and super().__contains__(pair[::-1]))
+
+    def get(self, pair, default=None):
+        """The force of a pair, or ``default`` where it did not touch; KeyError for other labels."""
+        return self[pair] if pair in self or set(pair) - set(self._names) else default
+
+
 @dataclass(frozen=True)
 class Contacts:
     """Contacts of the last step, of which the first body is a vertex or a point of an edge.
@@ -92,11 +125,11 @@ def contacts(state: State, work: Work, dt: np.ndarray) -> Contacts:
     )
 
 
-def pair_forces(names: list[str], work: Work, duration: float) -> dict[tuple[str, str], PairForce]:
+def pair_forces(names: list[str], work: Work, duration: float) -> PairForces:
     """Of each pair that touched in the last ``duration`` [s], by their labels, in their order."""
     key = work.forces.pair_key.numpy()
     total = work.forces.pair_total.numpy() * work.forces.unit
-    out = {}
+    out = PairForces(names)
     for k in np.argsort(key):
         if key[k] >= 0 and duration > 0.0:
             both, friction, size, moment = np.split(total[k], [3, 6, 7])

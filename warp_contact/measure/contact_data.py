@@ -53,8 +53,8 @@ class PairForces(dict[tuple[str, str], PairForce]):
 
     def __contains__(self, pair: object) -> bool:
         """Whether a pair touched, in either order."""
-        both = isinstance(pair, tuple) and len(pair) == 2
-        return super().__contains__(pair) or (both and super().__contains__(pair[::-1]))
+        turned = pair[::-1] if isinstance(pair, tuple) else pair
+        return super().__contains__(pair) or super().__contains__(turned)
 
     def get(self, pair, default=None):
         """The force of a pair, or ``default`` where it did not touch; KeyError for other labels."""

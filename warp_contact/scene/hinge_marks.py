@@ -14,7 +14,7 @@ def marks_of(attachments: Sequence, start: np.ndarray) -> dict[str, np.ndarray]:
             continue
         p, line = attachment.points[0], attachment.points[-1] - attachment.points[0]
         axis = line / np.linalg.norm(line)
-        arms = []
+        arms: list[np.ndarray] = []
         for side, body in enumerate((attachment.a, attachment.b)):
             if body is None:
                 toward[k] = arms[0] / np.linalg.norm(arms[0])

@@ -14,8 +14,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 HIDDEN = ".warp_contact."  # how the names of what is not finished begin
-
-
 AT_ONCE = 16  # files: a disk takes them together, in hardly more time than one
 
 

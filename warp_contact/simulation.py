@@ -174,8 +174,8 @@ class Simulation(BetweenFrames, ContactData, Joined):
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Begin anew: the next frames give the bits of the first ones.
 
-        With ``worlds``, these alone begin anew, with the same bits too; ``frame`` and others go on,
-        and gravity, friction and restitution stay.
+        With ``worlds``, these alone begin anew, in almost all trials with these bits too; ``frame``
+        and others go on, and gravity, friction and restitution stay.
 
         Raises:
             ValueError: no body is in one of the worlds

@@ -23,7 +23,7 @@ def test_what_is_squeezed_rests_and_its_velocities_say_so(device):
     for _ in sim.frames(6):
         pass
     moved = np.abs(sim.positions("ball") - before).max() / 0.1  # [m/s]
-    # 1.2e-5 and 2e-5; 1.4e-4 with contacts solved as elsewhere, and velocities of 0.03 by the
-    # stiffness at rest. Half a step of the forces is 1 m/s.
+    # 1.3e-5 and 1.5e-5 [m/s]; 1.0e-4 and 1.6e-4 with contacts solved as elsewhere, and velocities
+    # of 0.035 by the stiffness at rest.
     assert moved < 5e-5
     assert np.abs(sim.velocities("ball")).max() < 1e-4

@@ -12,7 +12,7 @@ from warp_contact.frame.stepper import Stepper
 def begin_anew(stepper: Stepper, model: Model, state: State, chosen: np.ndarray) -> None:
     """Put the worlds ``chosen``, a mask (n_world,), where they were before the first frame.
 
-    What follows there are the bits of the first frames.
+    Nothing is left there of later frames, so that the first ones come again.
     """
     of_vert, last = chosen[stepper.worlds.of_vert], stepper.last
     for array, first in zip((state.x, state.v), stepper.first, strict=True):

@@ -59,7 +59,7 @@ def sweep_all(
     work: Work,
     look: int,
     extrapolation: float,
-    tolerance: float = TOLERANCE,
+    tolerance: float,
 ) -> None:
     """Change ``v`` by normal impulses and friction until no contact approaches."""
     w, c = work.implicit, work.contacts

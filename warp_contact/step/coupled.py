@@ -79,8 +79,6 @@ def close(model: Model, state: State, work: Work, look: int) -> None:
     place(model, x, work.implicit)  # bodies turn about where they are now
     if on("closure torque"):
         _find_spin(model, state, work)
-    if work.ties:
-        ties.begin_closure(x, work)
     w, c = work.implicit, work.contacts
     inputs = [c.n, c.record, work.surface.slack, x]
     outputs = [w.ahead, w.counted]

@@ -30,15 +30,6 @@ def begin(x: wp.array, work: Work) -> None:
     find_matrix(x, work)
 
 
-def begin_closure(x: wp.array, work: Work) -> None:
-    """Let matrix and row sums be those at ``x``, where the mobilities are now.
-
-    Where ties say twice what they say, those of another place could not take back what they add.
-    """
-    find_matrix(x, work)
-    find_rows(work)
-
-
 def hold(model: Model, state: State, work: Work) -> None:
     """Change ``state.v`` so that ties are closed at the end of the step."""
     t = work.ties

@@ -107,7 +107,7 @@ class Simulation(BetweenFrames, ContactData, Joined):
         self._stepper = Stepper(
             *of, self.response, self.fps, substeps, max_substeps, sleeping, shapes
         )
-        self._meter, self._moves = Meter(self.model), Moves()
+        self._meter, self._moves = Meter(self.model, self._stepper.work.ties), Moves()
         self._skins = Skins(self.scene, self.model)
         self._surroundings = Surroundings(self.model)
 
@@ -187,7 +187,7 @@ class Simulation(BetweenFrames, ContactData, Joined):
                 self._surroundings.reset()
                 if self.model.restitution.numpy().any():
                     self._stepper.buffers.let_rebound()
-                self._meter = Meter(self.model)
+                self._meter = Meter(self.model, self._stepper.work.ties)
             self.frame = 0
             return
         of_body, stepper = self.model.body_world.numpy(), self._stepper
@@ -247,7 +247,7 @@ class Simulation(BetweenFrames, ContactData, Joined):
             self.state.v.assign(values["v"])
             self._surroundings.restore(**checkpoint.group(values, "surroundings"))
             memory.restore(self._stepper, values)
-            self._meter = Meter(self.model)
+            self._meter = Meter(self.model, self._stepper.work.ties)
             self._meter.tunnelling.remember(checkpoint.group(values, "meter"))
             self._moves.restore(checkpoint.group(values, "moves"))
         self.frame = int(values["frame"])

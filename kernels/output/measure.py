@@ -12,6 +12,7 @@ from warp_contact.kernels.lengths import FLUSH
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.narrow_phase.surface_query import closest_hit, first_crossing, inner_side
 from warp_contact.kernels.options import OPTIONS
+from warp_contact.kernels.ties.attachment import Partners, hang_together
 
 wp.set_module_options(OPTIONS)
 
@@ -42,6 +43,7 @@ def vertex_overlaps(
     mesh: Mesh,
     surf: wp.array[int],  # (n_surf,)
     body_world: wp.array[int],  # (n_body,)
+    partners: Partners,  # bodies that hang together do not meet
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     overlap: wp.array[float],  # (n_surf,) [m]
@@ -65,7 +67,8 @@ def vertex_overlaps(
         t = mesh.tets[q]
         body = mesh.vert_body[t[0]]
         least = wp.min(tet_weights(p, x[t[0]], x[t[1]], x[t[2]], x[t[3]]))
-        if body != own and least >= -FLUSH:  # rounding puts it out of all tets that share a face
+        met = body != own and not hang_together(partners, own, body)
+        if met and least >= -FLUSH:  # rounding puts it out of all tets that share a face
             root = wp.bvh_get_group_root(mesh.bvh, body)
             hit = closest_hit(mesh.bvh, root, mesh.tris, x, p, 0.1 * mesh.body_edge[body])
             flush = FLUSH * mesh.body_edge[body]
@@ -82,6 +85,7 @@ def edge_overlaps(
     bodies: wp.uint64,  # Bvh over the bodies, grouped by world
     mesh: Mesh,
     body_world: wp.array[int],  # (n_body,)
+    partners: Partners,  # bodies that hang together do not meet
     x: wp.array[wp.vec3],  # (n_vert,) [m]
     # out
     overlap: wp.array[float],  # (n_edge,) [m]
@@ -98,7 +102,7 @@ def edge_overlaps(
     world = body_world[own]
     body = next_in(bodies, world, wp.min(p, q), wp.max(p, q), -1)
     while body >= 0:
-        if body != own:
+        if body != own and not hang_together(partners, own, body):
             root = wp.bvh_get_group_root(mesh.bvh, body)
             piece = first_crossing(mesh.bvh, root, mesh.tris, x, p, q - p)
             if piece.enter.tri >= 0 and piece.leave.tri >= 0:

@@ -22,6 +22,7 @@ from warp_contact.kernels.output.crossing_time import (
     height,
     turning,
 )
+from warp_contact.kernels.ties.attachment import Partners, hang_together
 
 wp.set_module_options(OPTIONS)
 
@@ -39,6 +40,14 @@ class Trip:
     back_tri: int
     left: float
     left_tri: int
+
+
+@wp.struct
+class Inside:
+    """The points that are in a body."""
+
+    entered: wp.array[int]  # (n_point,) triangle by which it went in, -1 outside
+    deep: wp.array[int]  # (n_point,) 1 where it has been deep in that body
 
 
 @wp.func
@@ -174,11 +183,11 @@ def follow_points(
     ends: wp.array[wp.vec2i],  # (n_point,) a point is in the middle between two vertices
     body_world: wp.array[int],  # (n_body,)
     body_thickness: wp.array[float],  # (n_body,) [m]
+    partners: Partners,  # bodies that hang together may pass through each other
     x0: wp.array[wp.vec3],  # (n_vert,) [m]
     x1: wp.array[wp.vec3],  # (n_vert,) [m]
     # in, out
-    entered: wp.array[int],  # (n_point,) triangle by which it went into a body, -1 outside
-    deep: wp.array[int],  # (n_point,) 1 where it has been deep in that body
+    inside: Inside,
     # out
     passed: wp.array[int],  # (n_point,) body, n_body + p for plane p, -1 for none
 ):
@@ -189,8 +198,8 @@ def follow_points(
     p0 = 0.5 * (x0[i] + x0[j])
     p1 = 0.5 * (x1[i] + x1[j])
     own = mesh.vert_body[i]
-    inside = int(-1)
-    inside_deep = int(0)
+    entered = int(-1)
+    deep = int(0)
     through = int(-1)
     for m in range(mesh.plane_n.shape[0]):
         sunk = mesh.plane_h[m] - body_thickness[own]
@@ -199,13 +208,13 @@ def follow_points(
     world = body_world[own]
     body = next_in(bodies, world, wp.min(p0, p1), wp.max(p0, p1), -1)
     while body >= 0:
-        if body != own:
+        if body != own and not hang_together(partners, own, body):
             trip = trip_through(mesh.bvh, body, mesh.tris, x0, x1, p0, p1)
             came = trip.came_tri
             been = int(0)
-            if entered[k] >= 0 and mesh.tri_body[entered[k]] == body:
-                came = entered[k]
-                been = deep[k]
+            if inside.entered[k] >= 0 and mesh.tri_body[inside.entered[k]] == body:
+                came = inside.entered[k]
+                been = inside.deep[k]
                 trip.came = 0.0
             if came >= 0:
                 out = trip.left_tri >= 0 and trip.left > trip.came
@@ -217,14 +226,14 @@ def follow_points(
                 if out and been == 1 and opposed(came, trip.left_tri, mesh.tris, x1):
                     through = body
                 if trip.back > trip.left:
-                    inside = trip.back_tri
-                    inside_deep = 0
+                    entered = trip.back_tri
+                    deep = 0
                     if trip.left_tri < 0:
-                        inside_deep = been
+                        deep = been
                 elif trip.left_tri < 0:
-                    inside = came
-                    inside_deep = been
+                    entered = came
+                    deep = been
         body = next_in(bodies, world, wp.min(p0, p1), wp.max(p0, p1), body)
-    entered[k] = inside
-    deep[k] = inside_deep
+    inside.entered[k] = entered
+    inside.deep[k] = deep
     passed[k] = through

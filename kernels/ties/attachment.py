@@ -36,6 +36,18 @@ class Partners:
     start: wp.array[int]  # (n_body + 1,) first entry of each
     body: wp.array[int]  # (2 n_attachment,) the other one, -1 for the world
     by: wp.array[int]  # (2 n_attachment,) the attachment
+    broken: wp.array[int]  # (n_attachment,) 1 where it is
+
+
+@wp.func
+def hang_together(partners: Partners, b: int, c: int) -> bool:
+    """Whether an attachment between two bodies holds."""
+    if partners.start.shape[0] == 0:
+        return False  # nothing is attached
+    for k in range(partners.start[b], partners.start[b + 1]):
+        if partners.body[k] == c and partners.broken[partners.by[k]] == 0:
+            return True
+    return False
 
 
 @wp.kernel
@@ -130,7 +142,6 @@ def keep_apart(
     edges: wp.array[wp.vec4i],  # (n_edge,) where the owners are edges, else empty
     pairs: PairList,
     partners: Partners,
-    broken: wp.array[int],  # (n_attachment,)
     # out
     clear_until: wp.array[float],  # (capacity,) [m] travelled by both, before they meet
 ):
@@ -139,7 +150,5 @@ def keep_apart(
         i = pairs.pair[c][0]
         if edges.shape[0] > 0:
             i = edges[i][0]
-        b = vert_body[i]
-        for k in range(partners.start[b], partners.start[b + 1]):
-            if partners.body[k] == pairs.pair[c][1] and broken[partners.by[k]] == 0:
-                clear_until[c] = NEVER
+        if hang_together(partners, vert_body[i], pairs.pair[c][1]):
+            clear_until[c] = NEVER

@@ -31,7 +31,8 @@ from warp_contact.kernels.ties.tie import HELD, IDLE, Ties, across, direction, g
 wp.set_module_options(OPTIONS)
 
 ADDED = wp.constant(wp.float64(1.0e-6))  # part of the diagonal
-SINGULAR = wp.constant(wp.float64(1.0e-4))  # part of the diagonal that other ties leave
+GOLDEN = wp.constant(wp.float64(0.6180339887498949))
+SINGULAR = wp.constant(wp.float64(1.0e-5))  # of s, which is left where K is singular
 
 
 @wp.func
@@ -184,7 +185,6 @@ def factorise(
     c = wp.tid()
     first = ties.block[c]
     n = ties.first[c + 1] - ties.first[c]
-    ties.singular[c] = 0
     for i in range(n):
         row = first + i * n
         for j in range(i + 1):
@@ -197,8 +197,52 @@ def factorise(
                 l = lower(s + wp.diag(least), least)
                 ties.matrix[row + j] = l
                 ties.added[ties.first[c] + i] = least
-                for k in range(3):
-                    if l[k, k] * l[k, k] * SINGULAR * least[k] > ADDED:
-                        ties.singular[c] = 1
             else:
                 ties.matrix[row + j] = s @ wp.transpose(ties.matrix[other + j])
+
+
+@wp.func
+def substitute(c: int, ties: Ties):
+    """(K + E)^-1 r in place of r in the pulls of cluster c."""
+    first = ties.first[c]
+    n = ties.first[c + 1] - first
+    for i in range(n):
+        row = ties.block[c] + i * n
+        s = ties.pull[first + i]
+        for j in range(i):
+            s -= ties.matrix[row + j] * ties.pull[first + j]
+        ties.pull[first + i] = ties.matrix[row + i] * s
+    for k in range(n):
+        i = n - 1 - k
+        s = ties.pull[first + i]
+        for j in range(i + 1, n):
+            s -= wp.transpose(ties.matrix[ties.block[c] + j * n + i]) * ties.pull[first + j]
+        ties.pull[first + i] = wp.transpose(ties.matrix[ties.block[c] + i * n + i]) * s
+
+
+@wp.kernel
+def find_singular(
+    # in, out
+    ties: Ties,
+):
+    """One thread per cluster: whether K is singular, from (K + E)^-1 E (K + E)^-1 E s.
+
+    What a singular K leaves of s stays as it is, all else becomes 1e-6 of it or less. The numbers s
+    are of no direction that ties have by symmetry. One pivot of L would not do: it may be large
+    where that of another tie is not yet small.
+    """
+    c = wp.tid()
+    first = ties.first[c]
+    for t in range(first, ties.first[c + 1]):
+        for k in range(3):
+            s = GOLDEN * wp.float64(3 * (t - first) + k)
+            ties.pull[t][k] = s - wp.floor(s) - wp.float64(0.5)
+    twice = int(2)  # a variable: two copies of what follows would take longer to compile
+    for _ in range(twice):
+        for t in range(first, ties.first[c + 1]):
+            ties.pull[t] = wp.cw_mul(ties.added[t], ties.pull[t])
+        substitute(c, ties)
+    ties.singular[c] = 0
+    for t in range(first, ties.first[c + 1]):
+        if wp.length(ties.pull[t]) > SINGULAR:
+            ties.singular[c] = 1

@@ -29,7 +29,7 @@ from warp_contact.kernels.impulse.rows import Touched
 from warp_contact.kernels.impulse.touched import velocity
 from warp_contact.kernels.narrow_phase.contact_graph import ContactGraph
 from warp_contact.kernels.options import OPTIONS
-from warp_contact.kernels.ties.matrix import block33
+from warp_contact.kernels.ties.matrix import block33, substitute
 from warp_contact.kernels.ties.tie import HELD, Tied, Ties, across, change, direction, gap, speed
 from warp_contact.kernels.worlds import DONE, Worlds
 
@@ -98,27 +98,8 @@ def find_changes(
 
 
 @wp.func
-def substitute(c: int, ties: Ties):
-    """(K + E)^-1 r in place of r in the pulls of cluster c."""
-    first = ties.first[c]
-    n = ties.first[c + 1] - first
-    for i in range(n):
-        row = ties.block[c] + i * n
-        s = ties.pull[first + i]
-        for j in range(i):
-            s -= ties.matrix[row + j] * ties.pull[first + j]
-        ties.pull[first + i] = ties.matrix[row + i] * s
-    for k in range(n):
-        i = n - 1 - k
-        s = ties.pull[first + i]
-        for j in range(i + 1, n):
-            s -= wp.transpose(ties.matrix[ties.block[c] + j * n + i]) * ties.pull[first + j]
-        ties.pull[first + i] = wp.transpose(ties.matrix[ties.block[c] + i * n + i]) * s
-
-
-@wp.func
 def find_pulls(c: int, ties: Ties):
-    """K^-1 r in place of r in the pulls of cluster c."""
+    """K^-1 r in place of r in the pulls of cluster c, as in matrix.py."""
     if ties.singular[c] != 0:
         for t in range(ties.first[c], ties.first[c + 1]):
             ties.asked[t] = ties.pull[t]

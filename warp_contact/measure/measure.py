@@ -7,11 +7,13 @@ import warp as wp
 
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
+from warp_contact.data.ties import TieWork
 from warp_contact.data.work import Work
 from warp_contact.kernels.lengths import UNHELD
 from warp_contact.kernels.motion import motion
 from warp_contact.kernels.output import measure as kernels
 from warp_contact.kernels.output import self_overlap as own
+from warp_contact.kernels.ties.attachment import Partners
 from warp_contact.measure.solids import Solids
 from warp_contact.measure.trees import Trees
 from warp_contact.measure.tunnelling import Tunnelling
@@ -34,7 +36,8 @@ class Measure:
         gravitational: energy against the origin [J]
         momentum: at the time of the positions [kg m/s], shape (3,)
         angular_momentum: the same about the origin [kg m^2/s], shape (3,)
-        overlap: deepest overlap of a vertex or an edge [m]
+        overlap: deepest overlap of a vertex or an edge [m]; not between bodies that are attached
+            to each other: they do not meet
         overlap_pair: labels of its bodies, None without overlap
         self_overlap: deepest overlap of a vertex or an edge with its own body, folded or of several
             pieces [m]; at most the thickness of what went in. Nothing holds it: contact is between
@@ -91,8 +94,8 @@ class Meter:
         tunnelling: remembers the last state measured, to tell what went through a body since then
     """
 
-    def __init__(self, model: Model):
-        """Read what stays constant."""
+    def __init__(self, model: Model, ties: TieWork | None):
+        """Read what stays constant; ``ties`` of the step, if there are any."""
         self.model = model
         self.mass = model.mass.numpy().astype(np.float64)  # 0 where a body has its own
         self._solids = Solids(model)
@@ -100,8 +103,8 @@ class Meter:
         self.names = [*model.labels, *(f"plane{p}" for p in range(model.n_plane))]
         self._tets, self._body = model.tets.numpy(), model.vert_body.numpy()
         self._volume = model.volume.numpy()
-        self._trees = Trees(model)
-        self.tunnelling = Tunnelling(model, self.names, self._trees)
+        self._trees, self._partners = Trees(model), ties.partners if ties else Partners()
+        self.tunnelling = Tunnelling(model, self.names, self._trees, self._partners)
 
     @np.errstate(invalid="ignore", over="ignore")
     def measure(
@@ -206,13 +209,14 @@ class Meter:
         wp.launch(
             kernels.vertex_overlaps,
             dim=model.n_surf,
-            inputs=[trees.volumes.id, trees.mesh, model.surf, model.body_world, x],
+            inputs=[trees.volumes.id, trees.mesh, model.surf, model.body_world]
+            + [self._partners, x],
             outputs=list(at_vert),
         )
         wp.launch(
             kernels.edge_overlaps,
             dim=model.n_edge,
-            inputs=[trees.bodies.id, trees.mesh, model.body_world, x],
+            inputs=[trees.bodies.id, trees.mesh, model.body_world, self._partners, x],
             outputs=list(at_edge),
         )
         depth = np.concatenate([at_vert[0].numpy(), at_edge[0].numpy()])

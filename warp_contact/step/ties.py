@@ -116,7 +116,7 @@ def keep_apart(model: Model, work: Work) -> None:
     """Let no pair of bodies that are attached to each other meet, until pairs are found again."""
     t, b = work.ties, work.broad_phase
     for pairs, edges in ((b.verts, t.no_edges), (b.edges, model.edges)):
-        inputs = [model.vert_body, edges, pairs.list, t.partners, t.attachments.broken]
+        inputs = [model.vert_body, edges, pairs.list, t.partners]
         n, outputs = pairs.clear_until.shape[0], [pairs.clear_until]
         launch_over(attachment.keep_apart, n, inputs=inputs, outputs=outputs)
 
@@ -133,6 +133,7 @@ def find_matrix(x: wp.array, work: Work) -> None:
     t = work.ties
     wp.launch(matrix.assemble, t.n, inputs=[x, work.implicit.bodies], outputs=[t.ties])
     wp.launch(matrix.factorise, t.n_cluster, inputs=[], outputs=[t.ties])
+    wp.launch(matrix.find_singular, t.n_cluster, inputs=[], outputs=[t.ties])
 
 
 def _pull(model: Model, y: wp.array, work: Work, keeps: bool) -> None:

@@ -17,6 +17,11 @@ def square(x: float) -> dict:
     return {"x": np.array([x, x * x]), "square": np.float64(x * x)}
 
 
+def cube(x: float) -> float:
+    """Its third power."""
+    return x**3
+
+
 def noted(x: int, folder: str) -> int:
     """Leave a note each time that it begins; return how many there are."""
     with (Path(folder) / f"{x}.txt").open("a") as file:

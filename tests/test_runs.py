@@ -1,5 +1,6 @@
 """wc.sweep: every case once, whatever is killed; the same bits in any process."""
 
+import functools
 import json
 import os
 import shutil
@@ -212,3 +213,13 @@ def test_a_file_of_something_else_is_refused(tmp_path):
     (tmp_path / runs.FILE).write_text('{"frame": 1}\n')
     with pytest.raises(ValueError, match=r"results\.jsonl, line 1: it is no result"):
         wc.sweep(swept.square, [{"x": 1}], Here(), out=tmp_path)
+
+
+def test_a_folder_with_results_of_another_function_is_refused(tmp_path):
+    cases = [{"x": 2.0}]
+    wc.sweep(swept.square, cases, Here(), out=tmp_path)
+    named = functools.partial(swept.square)  # the same function, in other clothes
+    assert wc.sweep(named, cases, Here(), out=tmp_path)[0]["square"] == 4.0
+    for _ in range(2):  # and leaves it free
+        with pytest.raises(ValueError, match=r"has results of swept\.square: give swept\.cube an"):
+            wc.sweep(swept.cube, cases, Here(), out=tmp_path)

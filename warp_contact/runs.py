@@ -4,9 +4,11 @@ A line in a file for every case that has ended, written by this process alone, s
 whatever is killed, no case is lost or counted twice. A case gives the same bits in any process.
 """
 
+import functools
 import json
 import os
 import signal
+import sys
 import time
 import traceback
 from asyncio import CancelledError  # Dask's of a case is one of these
@@ -16,6 +18,7 @@ from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from pathlib import Path
 from threading import Thread
 
 import warp as wp
@@ -42,18 +45,19 @@ def sweep(run: Callable, cases: Iterable[dict], executor=None, out=None, tries: 
             where there is none; or anything whose ``submit`` returns what has ``done``, ``result``
             and ``cancel``: a pool of ``concurrent.futures``, a client of Dask, one of submitit
         out: a folder; what a case gives is a line of its ``results.jsonl`` once the case has
-            ended. What is there is not run again: another ``run`` needs another folder
+            ended. What is there is not run again
         tries: how often a case is begun whose process is killed
 
     Raises:
-        ValueError: for cases that are not plain, or a ``run`` that processes cannot import
+        ValueError: for cases that are not plain, a ``run`` that processes cannot import, or an
+            ``out`` that has results of a function of another name or file
         FileExistsError: another sweep writes to ``out``
         RuntimeError: some cases failed; all others are done. Those that failed run again next time
     """
     tries = checks.count(tries, "tries")
     _check(run, cases, executor)
     given = [_key(case, k) for k, case in enumerate(cases)]
-    results = Results(out)
+    results = Results(out, _name(run))
     try:
         todo = [key for key in dict.fromkeys(given) if "result" not in results.known.get(key, ())]
         if todo:
@@ -76,6 +80,15 @@ def _check(run, cases, executor) -> None:
         raise checks.refuse("cases", cases, "give a list of dicts")
     if executor is not None and not hasattr(executor, "submit"):
         checks.count(executor, "executor")
+
+
+def _name(run: Callable) -> str:
+    """Name of the file and the function; the same for a script and for what imports it."""
+    while isinstance(run, functools.partial):
+        run = run.func
+    named = run if hasattr(run, "__qualname__") else type(run)
+    place = sys.modules.get(named.__module__)
+    return f"{Path(getattr(place, '__file__', None) or named.__module__).stem}.{named.__qualname__}"
 
 
 def _run(run: Callable, waiting: deque, places: list, tries: int, results: "Results") -> None:
@@ -141,19 +154,27 @@ def _plain(value):
 class Results:
     """What became of cases: ``known`` by case, and lines of a file in a folder if there is one.
 
-    The line of a case is {"case": ..., "result": ...}, or has "error" with a traceback.
+    The line of a case is {"run": ..., "case": ..., "result": ...}, or has "error" with a traceback.
     """
 
-    def __init__(self, folder):
-        """Read what is there; raises FileExistsError where another sweep writes."""
+    def __init__(self, folder, run: str):
+        """Read what is there of the function ``run``.
+
+        Raises FileExistsError where another sweep writes, ValueError for lines of another function.
+        """
+        self._run = run
         self.known: dict[str, dict] = {}
         self._path = self._lock = None
         if folder is not None:
             path = checks.path(folder, "out") / FILE
             path.parent.mkdir(parents=True, exist_ok=True)
             self._path, self._lock = path, Lock(path.with_name(f"{HIDDEN}lock"))
-            if path.exists():
-                self._read()
+            try:
+                if path.exists():
+                    self._read()
+            except BaseException:
+                self.close()
+                raise
 
     def _read(self) -> None:
         data = self._path.read_bytes()
@@ -163,14 +184,18 @@ class Results:
         for k, line in enumerate(data[:whole].splitlines(), 1):
             try:
                 answer = json.loads(line)
-                self.known[_key(answer.pop("case"), k)] = answer
+                of, key = answer.pop("run"), _key(answer.pop("case"), k)
             except (ValueError, KeyError, AttributeError):
                 raise ValueError(f"{self._path}, line {k}: it is no result of a case") from None
+            if of != self._run:
+                raise ValueError(f"{self._path} has results of {of}: give {self._run} another out")
+            self.known[key] = answer
 
     def add(self, key: str, answer: dict) -> None:
         """Keep what became of a case."""
         if self._path:
-            append(self._path, json.dumps({"case": json.loads(key)} | answer) + "\n")
+            line = {"run": self._run, "case": json.loads(key)} | answer
+            append(self._path, json.dumps(line) + "\n")
         self.known[key] = answer
 
     def close(self) -> None:

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from warp_contact import MeshError, NeoHookean, Scene, TetMesh, box
+from warp_contact import MeshError, NeoHookean, Scene, Simulation, TetMesh, box
 
 RUBBER = NeoHookean(1e5, 0.3, 1000.0)
 
@@ -105,3 +105,13 @@ def test_a_scene_refuses_sizes_without_a_place_in_float32(size):
     mesh = box(1.0, 1).scaled(size, size, size)
     with pytest.raises(ValueError, match=r"body 'body0': its mesh is .* m large, and must have"):
         Scene().add_body(mesh, RUBBER)
+
+
+def test_a_body_that_its_own_weight_would_crush_is_warned_of():
+    scene = Scene()
+    scene.add_body(box(0.1, 1), NeoHookean(0.1, 0.3, 1000.0), label="gel")  # 981 Pa
+    scene.add_body(box(0.1, 1), NeoHookean(0.1, 0.3, 1000.0), (1, 0, 0), fixed=True)
+    scene.add_body(box(0.1, 1), NeoHookean(400.0, 0.3, 1000.0), (2, 0, 0))
+    with pytest.warns(UserWarning, match=r"'gel': at its foot .* 981 Pa, 9.81e\+03 times") as said:
+        Simulation(scene)
+    assert len(said) == 1 and said[0].filename == __file__

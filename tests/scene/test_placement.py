@@ -52,7 +52,7 @@ def test_a_body_is_refused_where_rounding_drowns_its_gap_at_rest(scale):
     p, q = mesh.vertices[mesh.edges].swapaxes(0, 1)
     most = 1.5 * 2e-4 * 2.0**24 * np.linalg.norm(p - q, axis=1).mean()
     for far in (0.9 * most, 1.1 * most):
-        scene = Scene()
+        scene = Scene((0.0, 0.0, 0.0))
         scene.add_body(mesh, RUBBER, (0.0, -far, 0.0), label="remote")
         if far < most:
             Simulation(scene)

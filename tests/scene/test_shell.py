@@ -50,6 +50,15 @@ def test_a_shell_of_a_smooth_surface_is_everywhere_as_thick_as_asked(side):
     assert mesh.n_pieces == 1 and mesh.quality.min() > 0.1
 
 
+def test_outside_is_outside_of_a_closed_surface_however_its_triangles_turn():
+    box = surface_of(wc.box(0.2, 2))
+    turned = wc.Surface(box.vertices + [0.0, 0.0, 5.0], box.triangles[:, [0, 2, 1]])
+    for side in SIDES:
+        one, other = wc.shell(box, 0.01, side), wc.shell(turned, 0.01, side)
+        assert other.volume == pytest.approx(one.volume, rel=1e-9)
+        np.testing.assert_allclose(other.vertices - [0.0, 0.0, 5.0], one.vertices, atol=1e-12)
+
+
 def test_an_open_surface_is_kept_on_one_side():
     surface = sheet(4, lambda x, y: 0.1 * x * x)
     for side, first in ("outside", 0), ("inside", 1):

@@ -23,6 +23,7 @@ def assemble(scene: Scene) -> tuple[Model, State]:
     if not bodies:
         raise ValueError("the scene has no body")
     placement.check(bodies)
+    placement.check_weights(bodies, np.array(scene.gravity))
     x = np.concatenate([body.x for body in bodies])
     v = np.concatenate([body.v for body in bodies])
     tets = _joined(bodies, "tets")

@@ -16,6 +16,7 @@ DROWNED = 1.5
 STRAINED = 0.02  # strain that rounding of the positions may put on a tet
 POSSIBLE = 1e-8, 1e9  # size of a body [m] whose masses and volumes fit float32
 PLAUSIBLE = 0.9e-6, 1.1e3  # size of a body [m]; others run too
+CRUSHED = 3.0  # pressure of its own weight, in Young's moduli, under which nothing keeps a shape
 
 
 def check_given(mesh, material, label: str, render) -> None:
@@ -94,6 +95,22 @@ def check(bodies: list) -> None:
                 f"positions would strain it by {strain.max():.2g}; remesh it"
             )
     check_apart(bodies, edges)
+
+
+def check_weights(bodies: list, gravity: np.ndarray) -> None:
+    """Warn of bodies that their own weight crushes: most often a unit is wrong."""
+    for body in bodies:
+        young = getattr(body.material, "youngs_modulus", None)
+        if young is None or np.all(body.fixed):
+            continue
+        pressure = body.material.density * float(np.ptp(body.starts @ gravity))
+        if pressure > CRUSHED * young:
+            warnings.warn(
+                f"body '{body.label}': at its foot its own weight presses with {pressure:.3g} Pa, "
+                f"{pressure / young:.3g} times its Young's modulus, and crushes it; check "
+                f"youngs_modulus [Pa], density [kg/m^3], its size [m] and gravity [m/s^2]",
+                stacklevel=5,
+            )
 
 
 def check_distance(x: np.ndarray, edge: float, label: str) -> None:

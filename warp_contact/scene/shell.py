@@ -37,7 +37,8 @@ def shell(surface: Surface, thickness: float, side: str = "outside") -> TetMesh:
     Args:
         surface: an open one, or a closed one that stays hollow
         thickness: [m]
-        side: on which side of the surface the material is, ``outside``, ``inside`` or ``both``
+        side: on which side of the surface the material is, ``outside``, ``inside`` or ``both``;
+            the outside of a closed one is that which it does not enclose, however triangles turn
 
     Raises:
         ValueError: a thickness or side that is none; MeshError: a triangle whose prism would turn
@@ -49,7 +50,10 @@ def shell(surface: Surface, thickness: float, side: str = "outside") -> TetMesh:
     surface.check_sheet()
     used, tris = np.unique(surface.triangles, return_inverse=True)
     tris, x = tris.reshape(-1, 3), surface.vertices[used]
-    d = _directions(x, tris, surface.areas)
+    areas = surface.areas
+    if surface.is_closed and np.sum(x[tris].mean(axis=1) * areas) < 0.0:  # inside out
+        tris, areas = tris[:, ::-1], -areas
+    d = _directions(x, tris, areas)
     below, above = SIDES[side]
 
     def layers(t: float) -> np.ndarray:

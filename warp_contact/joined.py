@@ -97,9 +97,9 @@ class Joined:
         On the first body; ``attachment_force`` does not count it.
 
         Raises:
-            ValueError: there is no such attachment
+            ValueError: there is no such attachment, or it has no axis
         """
-        which = self._attachment(attachment)
+        which = self._with_axis(attachment, "a motor drives a hinge or a slider")
         with exclusively(self.device):
             impulse = float(self._stepper.work.ties.motors.sum.numpy()[which])
         return impulse * self.fps if self.frame else 0.0

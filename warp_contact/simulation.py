@@ -13,7 +13,7 @@ from warp_contact.exclusive import exclusively
 from warp_contact.frame import checkpoint, memory
 from warp_contact.frame.implicit_shapes import find_shapes
 from warp_contact.frame.integrator import KINDS as INTEGRATORS
-from warp_contact.frame.integrator import choose
+from warp_contact.frame.integrator import choose, reason
 from warp_contact.frame.load_kernels import load_kernels
 from warp_contact.frame.moves import Moves
 from warp_contact.frame.some_worlds import begin_anew
@@ -120,7 +120,8 @@ class Simulation(BetweenFrames, ContactData, Joined):
         """One line: how large the scene is, what steps it takes and why."""
         m, chosen = self.model, self._integrator
         size = f"{m.n_body} bodies, {m.n_vert} vertices, {m.n_tet} tets"
-        return f"{size}; {chosen.name} steps: {chosen.why}"
+        with exclusively(self.device):
+            return f"{size}; {chosen.name} steps: {reason(chosen, m, self.state)}"
 
     @property
     def time(self) -> float:
@@ -253,9 +254,15 @@ class Simulation(BetweenFrames, ContactData, Joined):
         self.frame = int(values["frame"])
 
     def _fingerprint(self) -> str:
-        sleeping = self._stepper.sleeping is not None
-        settings = self.response, self.fps, self._stepper.wanted, sleeping, self._integrator.name
-        return checkpoint.fingerprint(self.model, *settings, self._surroundings.first)
+        return checkpoint.fingerprint(
+            self.model,
+            self._surroundings.first,
+            response=self.response,
+            fps=self.fps,
+            substeps=self._stepper.wanted,
+            sleeping=self._stepper.sleeping is not None,
+            integrator=self._integrator.name,
+        )
 
 
 def _device(name: str | None) -> wp.Device:

@@ -73,14 +73,15 @@ def test_a_checkpoint_of_something_else_is_refused(rng, tmp_path):
     sim = Simulation(falling(rng))
     sim.save(tmp_path / "run.npz")
     rng.bit_generator.state = state
-    others = (
-        Simulation(falling(rng, mass=2.0)),
-        Simulation(sim.scene, PredictedForce()),
-        Simulation(sim.scene, fps=30),
-        Simulation(sim.scene, substeps=40),
-    )
-    for other in others:
-        with pytest.raises(ValueError, match="of another scene, or of other settings"):
+    others = {
+        "of another scene": Simulation(falling(rng, mass=2.0)),
+        "of other settings: response=ContactSurface": Simulation(sim.scene, PredictedForce()),
+        "of other settings: fps=60.0, not 30.0": Simulation(sim.scene, fps=30),
+        "of other settings: substeps=None, not 40": Simulation(sim.scene, substeps=40),
+        "integrator=explicit, not implicit": Simulation(sim.scene, integrator="implicit"),
+    }
+    for words, other in others.items():
+        with pytest.raises(ValueError, match=words):
             other.load(tmp_path / "run.npz")
         assert other.frame == 0
     (tmp_path / "text").write_text("nothing")

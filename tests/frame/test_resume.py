@@ -118,6 +118,7 @@ def test_a_run_in_which_bodies_sleep_is_resumed_like_any_other(tmp_path, monkeyp
     whole, out = tmp_path / "whole", tmp_path / "out"
     assert cli.main([*command, str(whole)]) == 0
     interrupted(monkeypatch, "step_frame", 42, [*command, str(out)])
+    assert "interrupted; --resume goes on from frame 42 or" in capsys.readouterr().err
     with np.load(out / "checkpoint.npz") as checkpoint:
         assert checkpoint["sleeping.awake"].tolist() == [0, 1]
     assert cli.main([*command, str(out), "--resume"]) == 0
@@ -160,8 +161,8 @@ def test_a_run_over_another_one_leaves_it_until_its_own_first_frame_is_whole(
     ("other", "words"),
     [
         (["thrown"], "of another scene"),
-        (["scene", "--fps", "30"], "of other settings"),
-        (["scene", "--response", "predicted"], "of other settings"),
+        (["scene", "--fps", "30"], "of other settings: fps=60"),
+        (["scene", "--integrator", "implicit"], "integrator=explicit, not implicit"),
         (["scene", "--set", "gap=0.02"], "placed or moved otherwise"),
         (["scene", "--set", "name=top"], "other bodies"),
     ],

@@ -1,5 +1,7 @@
 """What ``integrator="auto"`` takes."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,18 @@ def test_auto_reckons_with_a_fall_and_with_speed(bodies, height, gravity, speed,
         place, v = (0.3 * k, 0.0, height + 0.0501), (0.0, speed * k, 0.0)
         scene.add_body(wc.box(0.1, 3), rubber, place, velocity=v)
     assert f"{kind} steps: " in wc.Simulation(scene, integrator="auto").summary()
+
+
+def test_the_default_says_which_body_asks_for_most_steps():
+    scene = wc.Scene()
+    for k, young in enumerate((1e4, 1e9)):
+        material = wc.NeoHookean(young, 0.3, 1000.0)
+        scene.add_body(wc.box(0.1, 1), material, (0.0, 0.0, 0.2 * k), label=f"E{k}")
+    sim = wc.Simulation(scene)
+    said = sim.summary()
+    asked = int(re.search(r"default; body 'E1' asks for (\d+) explicit steps a second", said)[1])
+    # One frame has a whole number of steps, and a body that falls asks for no fewer.
+    assert sim.next_substeps() == pytest.approx(asked / sim.fps, rel=0.05)
 
 
 def test_auto_reckons_with_what_explicit_steps_could_pass():

@@ -43,7 +43,8 @@ def main(argv: list[str] | None = None) -> int:
             sys.stdout.flush()
             return code
     except KeyboardInterrupt as stop:
-        return fail("interrupted", 128 + getattr(stop, "number", signal.SIGINT))
+        said = "; ".join(["interrupted", *getattr(stop, "__notes__", ())])
+        return fail(said, 128 + getattr(stop, "number", signal.SIGINT))
     except BrokenPipeError:  # the reader of stdout, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

@@ -72,7 +72,12 @@ def write_run(sim: Simulation, module, folder: RunFolder, n: int, args) -> int:
     else:
         writer = UsdWriter(folder, sim, **options)
     with writer:
-        take_frames(sim, n, writer, args)
+        try:
+            take_frames(sim, n, writer, args)
+        except KeyboardInterrupt as stop:
+            if (folder.now / CHECKPOINT).is_file():
+                stop.add_note(f"--resume goes on from frame {sim.frame} or shortly before")
+            raise
     if not args.quiet:
         print(f"{writer.root}: frames {writer.start} to {writer.end}")
         print(folder.now / METRICS)

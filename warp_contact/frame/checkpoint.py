@@ -1,6 +1,7 @@
 """A run on disk: what a simulation of the same scene needs to continue with the same bits."""
 
 import hashlib
+import json
 import os
 from pathlib import Path
 
@@ -10,12 +11,15 @@ from numpy.lib.recfunctions import repack_fields
 from warp_contact.data.model import Model
 from warp_contact.files import replacing
 
-FORMAT = 12
+FORMAT = 13
 
 
-def fingerprint(model: Model, *settings) -> str:
-    """Digest of all that must be the same for a run to continue with the same bits."""
-    digest = hashlib.sha256(repr((FORMAT, settings)).encode())
+def fingerprint(model: Model, first: tuple, **settings) -> str:
+    """All that must be the same for a run to continue with the same bits, as JSON.
+
+    A digest of the scene, with its ``first`` surroundings, and the settings by their names.
+    """
+    digest = hashlib.sha256(repr(first).encode())
     arrays = [model.body_vert, model.body_world, model.tets, model.mass, model.inv_mass]
     arrays += [model.plane_n, model.plane_h]
     for elements in model.elements:
@@ -30,7 +34,8 @@ def fingerprint(model: Model, *settings) -> str:
         digest.update(np.array([solid.mass, *solid.centre, *solid.inertia.ravel()]).tobytes())
     for array in arrays:
         digest.update(array.numpy().tobytes())
-    return digest.hexdigest()
+    named = {name: str(value) for name, value in settings.items()}
+    return json.dumps({"format": FORMAT, "scene": digest.hexdigest()} | named)
 
 
 def write(path: str | os.PathLike, scene: str, values: dict[str, np.ndarray]) -> None:
@@ -53,12 +58,26 @@ def read(path: str | os.PathLike, scene: str) -> dict[str, np.ndarray]:
         raise
     except Exception as error:  # what a damaged archive leads to has no common name
         raise ValueError(f"{path} is no checkpoint, or damaged") from error
-    if str(values.pop("scene", "")) != scene:
-        what = "another scene, or of other settings or another version of the simulation"
-        raise ValueError(f"{path} is of {what}")
+    _refuse_other(str(values.pop("scene", "")), scene, path)
     if str(values.pop("digest", "")) != _digest(values):
         raise ValueError(f"{path} is damaged: it is not what was written")
     return values
+
+
+def _refuse_other(written: str, scene: str, path: str | os.PathLike) -> None:
+    """Raise ValueError, with what differs, where two fingerprints do."""
+    try:
+        old, now = json.loads(written), json.loads(scene)
+        other = [name for name in now if old[name] != now[name]]
+    except (ValueError, LookupError, TypeError):
+        other = ["format"]
+    if "format" in other:
+        raise ValueError(f"{path} is of another version of the simulation")
+    if "scene" in other:
+        raise ValueError(f"{path} is of another scene")
+    if other:
+        was = ", ".join(f"{name}={old[name]}, not {now[name]}" for name in other)
+        raise ValueError(f"{path} is of other settings: {was}")
 
 
 def ungroup(groups: dict[str, dict[str, np.ndarray]]) -> dict[str, np.ndarray]:

@@ -23,6 +23,7 @@ KINDS = "explicit", "implicit", "auto"
 DEARER = 3.0  # time of an implicit step, in explicit ones, of bodies of few vertices
 DENSE = 15.0  # vertices of a body that add as much as an explicit step: an inverse is dense
 BESIDE = 1.2  # the same of bodies that take explicit ones beside them: their number is rounded up
+DEFAULT = "the default"
 REMEDY = "take integrator='implicit'"
 NAMED = 3  # bodies that a summary names
 
@@ -71,7 +72,7 @@ def choose(
             raise ValueError(f"{name} needs implicit steps: {obstacle or REMEDY}")
         return Integrator(True, f"{name} needs them{_beside(model)}")
     if wanted == "explicit":
-        return Integrator(False, "the default")
+        return Integrator(False, DEFAULT)
     if wanted == "implicit":
         if obstacle:
             raise ValueError(f"integrator='implicit' is not possible: {obstacle}")
@@ -81,6 +82,13 @@ def choose(
     if obstacle:
         return Integrator(False, obstacle)
     return _cheaper(model, state)
+
+
+def reason(chosen: Integrator, model: Model, state: State) -> str:
+    """Why it was chosen; of the default also what it costs, in the present shapes."""
+    if chosen.why != DEFAULT:
+        return chosen.why
+    return f"{DEFAULT}; {_asks(model, _of_bodies(model, state)[0])}"
 
 
 def refuse_restitution(response, implicit: bool = True) -> None:
@@ -93,21 +101,31 @@ def refuse_restitution(response, implicit: bool = True) -> None:
 
 def _cheaper(model: Model, state: State) -> Integrator:
     """The kind of steps that takes less time."""
-    spectrum, large = Spectrum(model), too_large(model)
-    spectrum.rates(state.x)
-    speed = _speeds(model, state)
-    stable = spectrum.of_bodies[0] / (2.0 * step_bounds.SAFETY)
-    of_bodies = np.maximum(stable, speed / (step_bounds.REACH * model.body_thickness.numpy()))
-    per_second, thing = float(of_bodies.max()), model.labels[int(of_bodies.argmax())]
+    of_bodies, speed = _of_bodies(model, state)
+    large = too_large(model)
     n, dear = np.where(mobile(model), np.diff(model.body_vert.numpy()), 0), np.inf
     if n.any():
         passing = speed[n > 0] / (step_bounds.STRIDE * model.body_thickness.numpy()[n > 0])
         taken = max(step_bounds.RESOLVED, passing.max(), of_bodies[large].max(initial=0.0))
         dear = np.average(np.where(large, BESIDE, DEARER + n / DENSE), weights=n) * taken
-    implicit = per_second > dear
-    why = f"body '{thing}' would need {per_second:.0f} explicit steps a second"
-    why = f"{why}, as dear as implicit ones from {dear:.0f} on"
+    implicit = of_bodies.max() > dear
+    why = f"{_asks(model, of_bodies)}, as dear as implicit ones from {dear:.0f} on"
     return Integrator(implicit, why + _beside(model) if implicit else why)
+
+
+def _of_bodies(model: Model, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Explicit steps a second that each body asks for, and its speed [m/s], (n_body,)."""
+    spectrum = Spectrum(model)
+    spectrum.rates(state.x)
+    speed = _speeds(model, state)
+    stable = spectrum.of_bodies[0] / (2.0 * step_bounds.SAFETY)
+    return np.maximum(stable, speed / (step_bounds.REACH * model.body_thickness.numpy())), speed
+
+
+def _asks(model: Model, of_bodies: np.ndarray) -> str:
+    """Which body asks for most explicit steps."""
+    thing = model.labels[int(of_bodies.argmax())]
+    return f"body '{thing}' asks for {of_bodies.max():.0f} explicit steps a second"
 
 
 def _speeds(model: Model, state: State) -> np.ndarray:

@@ -236,9 +236,13 @@ def _check_number(kind: str, points: np.ndarray) -> None:
     if kind == "ball" and len(points) != 1:
         raise ValueError(f"a ball holds one vertex, not {len(points)}: a weld holds several")
     if kind == "weld":
-        size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-        if len(points) < 3 or size[1] < THIN * size[0]:
-            raise ValueError("a weld needs three vertices or more that are not on a line")
+        wide = len(points) >= 3
+        if wide:
+            size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+            wide = size[1] >= THIN * size[0]
+        if not wide:
+            text = f"three vertices or more that are not on a line, and has {len(points)}"
+            raise ValueError(f"a weld needs {text}")
 
 
 def _is_rigid(body: Body) -> bool:

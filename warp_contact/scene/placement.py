@@ -142,8 +142,8 @@ def check_apart(bodies: list, edges: list) -> None:
         if same.any():
             a, b = sorted((int(p[same.argmax()]), int(q[same.argmax()])))
             raise ValueError(
-                f"body '{bodies[a].label}' and body '{bodies[b].label}' are in exactly the same "
-                f"place: no direction leads out; move one of them"
+                f"body '{bodies[a].label}' and body '{bodies[b].label}' are in the same place, to "
+                f"{SAME_PLACE:g} of an edge: no direction leads out; move one of them"
             )
 
 

@@ -35,7 +35,8 @@ class Bodies:
         if isinstance(body, str):
             if body not in model.labels:
                 known = ", ".join(model.labels)
-                raise ValueError(f"there is no body '{body}': the scene has {known}")
+                more = "; forces() has those of planes" if PLANE.fullmatch(body) else ""
+                raise ValueError(f"there is no body '{body}': the scene has {known}{more}")
             body = model.labels.index(body)
         if not isinstance(body, Body | Integral) or isinstance(body, bool):
             raise checks.refuse("body", body, "a body, its label or its index")
@@ -74,7 +75,10 @@ class Bodies:
         free = chosen[~fixed[chosen]]
         if len(free) or not len(chosen):
             wrong = f"vertex {free[0]}" if len(free) else "no vertex"
-            only = "only fixed ones move to a place, set_positions puts others there"
+            only = (
+                "only fixed ones move to a place; set_positions puts others there, a motor of an "
+            )
+            only = f"{only}attachment or apply drives them"
             is_fixed = "is not" if len(free) else "is"
             raise ValueError(f"{wrong} of body '{self.label(body)}' {is_fixed} fixed: {only}")
         return part, chosen

@@ -180,8 +180,8 @@ class RunFolder:
             raise FileExistsError(f"{odd[0]} is in the way: remove it, or choose another folder")
         if there and not overwrite:
             raise FileExistsError(
-                f"{there[0]} is there already: go on with it (--resume), replace it (--overwrite; "
-                "in Python overwrite=True), or choose another folder"
+                f"{there[0]} is there already: go on with it (--resume), replace it (--overwrite), "
+                "in Python resume=True or overwrite=True, or choose another folder"
             )
         return bool(there)
 

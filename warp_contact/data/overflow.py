@@ -19,7 +19,7 @@ class Capacity:
         near: triangles of near bodies that reach into the slab of a body
     """
 
-    contacts: int = 256
+    contacts: int = 192
     pairs: int = 64
     verts: int = 256
     tets: int = 1024

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import warp as wp
 
 from warp_contact.kernels.impulse.constraint import Constraint, Impulse
@@ -51,6 +52,18 @@ class Contacts:
     impulse: wp.array[Impulse]
     part: wp.array[wp.vec3]
     kept: KeptContacts
+
+    def of_step(self) -> tuple[np.ndarray, np.ndarray]:
+        """The contacts that exchanged impulses in the last step, and these."""
+        n = int(self.kept.n.numpy()[0])
+        record, impulse = self.record, self.impulse
+        if n < 0:
+            n = int(self.n.numpy()[0])
+        else:
+            record, impulse = self.kept.record, self.kept.impulse
+        record, impulse = record.numpy()[:n], impulse.numpy()[:n]
+        made = (record["coef"] != 0.0).any(axis=1)
+        return record[made], impulse[made]
 
 
 def allocate(n_vert: int, capacity: int, n_vertex: wp.array[int]) -> Contacts:

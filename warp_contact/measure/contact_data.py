@@ -98,13 +98,7 @@ class Contacts:
 
 def contacts(state: State, work: Work, dt: np.ndarray) -> Contacts:
     """Those of the last step at the present positions; ``dt`` are the steps [s], (n_vert,)."""
-    n = int(work.contacts.kept.n.numpy()[0])
-    of = work.contacts if n < 0 else work.contacts.kept
-    if n < 0:
-        n = int(of.n.numpy()[0])
-    record, impulse = (a.numpy()[:n] for a in (of.record, of.impulse))
-    made = (record["coef"] != 0.0).any(axis=1)
-    record, impulse = record[made], impulse[made]
+    record, impulse = work.contacts.of_step()
     vert, coef, normal = record["vert"], record["coef"].astype(np.float64), record["normal"]
     at = state.x.numpy().astype(np.float64)[vert]
     u = np.einsum("ck,cki->ci", coef, state.v.numpy().astype(np.float64)[vert])

@@ -137,7 +137,7 @@ class Meter:
             overlap_pair=pair,
             self_overlap=self_overlap,
             self_overlap_body=folded,
-            n_contacts=int((_contacts(work)["coef"] != 0.0).any(1).sum()),
+            n_contacts=len(work.contacts.of_step()[0]),
             volume_ratio=float(ratio.min()),
             inverted=int((ratio <= 0.0).sum()),
             tunnelled=self.tunnelling.count,
@@ -158,7 +158,7 @@ class Meter:
         v = state.v.numpy().astype(np.float64)
         lagging = implicit + 0.5 * (explicit[:, None] * v * v).sum()
         power = (np.where(explicit[:, None] > 0.0, self._forces(state.x), 0.0) * v).sum(axis=1)
-        pair = _contacts(work)["pair"]
+        pair = work.contacts.of_step()[0]["pair"]
         mass = np.bincount(self._body, explicit)
         of_bodies = dt[self.model.body_vert.numpy()[:-1]]
         mass[np.unique(pair[pair < len(mass)])] = 0.0
@@ -257,13 +257,9 @@ class Meter:
         return float(depth[k]), self.names[model.vert_body.numpy()[first[k]]]
 
 
-def _contacts(work: Work) -> np.ndarray:
-    """Contacts of the last step, as they are in ``contacts.record``."""
-    return work.contacts.record.numpy()[: int(work.contacts.n.numpy()[0])]
-
-
 def _held(work: Work) -> np.ndarray:
     """Vertices that a contact of the last step moved out of another body or plane."""
-    contacts = _contacts(work)
+    last = work.contacts.record.numpy()[: int(work.contacts.n.numpy()[0])]  # of a second look
+    contacts = np.concatenate([last, work.contacts.of_step()[0]])
     own = contacts["vert"][:, :2]  # the others are those of the other side
     return own[contacts["coef"][:, :2] != 0.0]

@@ -30,6 +30,8 @@ def close_gaps(model: Model, state: State, work: Work, iterations: int) -> None:
     residual.add_gaps(model, state.x, work)
     if on("strays"):
         residual.add_strays(model, state.x, state.v, work)
+        if work.ties:
+            residual.look_again(work)
     if_any(work.surface.any_open, _close_gaps, model, state, work, iterations)
 
 

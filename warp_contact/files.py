@@ -10,7 +10,7 @@ import os
 import secrets
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 HIDDEN = ".warp_contact."  # how the names of what is not finished begin
@@ -36,18 +36,18 @@ def replacing(path: Path, wait: bool = True) -> Iterator[Path]:
         raise
 
 
-def renew(path: Path, text: str) -> None:
+def renew(path: str, text: str) -> None:
     """Replace a file without waiting for the disk; in place if it is as long as before.
 
     For less than a page: one call writes it, which no kill divides and which needs no room.
     """
     data = text.encode()
-    if not path.is_file() or path.stat().st_size != len(data):
-        with replacing(path, wait=False) as part:
-            part.write_bytes(data)
-        return
-    with path.open("r+b", buffering=0) as file:
-        file.write(data)
+    with suppress(FileNotFoundError), open(path, "r+b", buffering=0) as file:
+        if os.fstat(file.fileno()).st_size == len(data):
+            file.write(data)
+            return
+    with replacing(Path(path), wait=False) as part:
+        part.write_bytes(data)
 
 
 def append(path: Path, text: str, wait: bool = True) -> None:

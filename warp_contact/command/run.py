@@ -27,7 +27,7 @@ from warp_contact.simulation import Simulation
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce, VirtualSurface
 from warp_contact.usd.folder import RunFolder, frame_file
 from warp_contact.usd.kept import check_frames, read_layer
-from warp_contact.usd.motion import motion, numbers
+from warp_contact.usd.motion import motion, motion_types, numbers
 from warp_contact.usd.prims import parts
 from warp_contact.usd.writer import UsdWriter
 
@@ -137,8 +137,9 @@ def go_on(sim: Simulation, root: Path) -> None:
     if not saved.is_file():
         raise ValueError(f"nothing to resume: no file {saved}")
     x, begun = sim.positions(), figures(sim.measure())
-    moved = [pair for part in parts(sim.model) for pair in motion(part, sim, x)]
-    wanted = {name: numbers(value) for name, value in moved}
+    wanted = {}
+    for part in parts(sim.model):
+        wanted |= zip(motion_types(part), map(numbers, motion(part, sim, x)), strict=True)
     sim.load(saved)
     first = read_layer(frame_file(root.parent, 0))
     same = first is None or all(first.GetAttributeAtPath(name) for name in wanted)

@@ -6,7 +6,6 @@ bodies: sites are vertices (``point``), weights in tets (``tetrahedron``), or pl
 What has no name there is a constant under ``userProperties``.
 """
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -40,10 +39,9 @@ class Attachments:
         """The attributes of a frame."""
         return dict.fromkeys(self.flags, Sdf.ValueTypeNames.Bool)
 
-    def values(self, sim) -> Iterator[tuple[str, bool]]:
+    def values(self, sim) -> list[bool]:
         """Their values: what broke or was let go is not enabled."""
-        for path, attachment in self.flags.items():
-            yield path, sim.is_attached(attachment)
+        return [sim.is_attached(attachment) for attachment in self.flags.values()]
 
     def define(self, layer: Sdf.Layer) -> None:
         """Write all that does not change."""

@@ -4,8 +4,6 @@
 /World/forces    BasisCurves  from each of them along its force
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, Vt
 
@@ -73,8 +71,8 @@ class ContactArrows:
             f"{ARROWS}.curveVertexCounts": types.IntArray,
         }
 
-    def values(self, sim) -> Iterator[tuple]:
-        """Their paths and values now."""
+    def values(self, sim) -> tuple:
+        """Their values now."""
         found = sim.contacts()
         force = found.normal_force[:, None] * found.normal + found.friction_force
         if self.scale == 0.0 and force.any():
@@ -83,8 +81,7 @@ class ContactArrows:
         at, line = vectors(found.point), vectors(ends.reshape(-1, 3))
         pair = (Vt.IntArray.FromNumpy(b.astype(np.int32, order="C")) for b in found.bodies.T)
         counts = Vt.IntArray(len(found), 2)
-        values = at, extent(at), vectors(force), *pair, line, extent(line), counts
-        yield from zip(self.types(), values, strict=True)
+        return at, extent(at), vectors(force), *pair, line, extent(line), counts
 
 
 def extent(points: Vt.Vec3fArray) -> Vt.Vec3fArray:

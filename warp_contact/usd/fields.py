@@ -1,7 +1,5 @@
 """What contact does to the vertices of a body, as primvars of its surface."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from pxr import Sdf, Vt
 
@@ -24,15 +22,14 @@ def field_types(part: Part) -> dict[str, Sdf.ValueTypeName]:
     }
 
 
-def field_values(part: Part, shade: np.ndarray, fields: dict[str, np.ndarray]) -> Iterator[tuple]:
-    """Their paths and values, of the ``shades`` and the contact fields of all vertices."""
+def field_values(part: Part, shade: np.ndarray, fields: dict[str, np.ndarray]) -> tuple:
+    """Their values, of the ``shades`` and the contact fields of all vertices."""
     scalars = (rounded(fields[name][part.ids]) for name in ("pressure", "penetration"))
     shade, partner = (
         np.ascontiguousarray(a[part.ids], np.int32) for a in (shade, fields["partner"])
     )
     integers = Vt.IntArray.FromNumpy(shade), Vt.IntArray.FromNumpy(partner)
-    values = integers[0], *map(Vt.FloatArray.FromNumpy, scalars), integers[1]
-    yield from zip(field_types(part), values, strict=True)
+    return integers[0], *map(Vt.FloatArray.FromNumpy, scalars), integers[1]
 
 
 def rounded(value: np.ndarray) -> np.ndarray:

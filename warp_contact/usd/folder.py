@@ -87,7 +87,7 @@ class RunFolder:
         """
         self.root = root_path(path)
         folder = self.root.parent
-        self._late, self._synced = dict[Path, None](), time.monotonic()
+        self._late, self._synced = list[Path | str](), time.monotonic()
         self._made = [p for p in (folder, *folder.parents) if not p.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -111,15 +111,15 @@ class RunFolder:
         """Whether files may be written."""
         return self._lock.release.alive
 
-    def wrote(self, *paths: Path) -> None:
+    def wrote(self, *files: Path | str) -> None:
         """Know files that are not on the disk yet."""
-        for path in paths:
-            self._late |= {path: None, path.parent: None}
+        self._late += files
 
     def sync(self, every: float = 0.0) -> None:
         """Put them on the disk, unless that was done less than so long ago [s]."""
         if time.monotonic() - self._synced >= every:
-            sync_all(self._late)
+            files = dict.fromkeys(map(Path, dict.fromkeys(self._late)))
+            sync_all(files | dict.fromkeys(path.parent for path in files))
             self._late.clear()
             self._synced = time.monotonic()
 
@@ -236,7 +236,12 @@ def frames_of(folder: Path) -> Path:
 
 def frame_file(folder: Path, frame: int) -> Path:
     """The file of a frame."""
-    return frames_of(folder) / f"f.{frame:06d}.usdc"
+    return Path(frame_names(folder, frame)[1])
+
+
+def frame_names(folder: Path, frame: int) -> tuple[str, str]:
+    """The file of a frame: while it is written, and then. To make a Path takes as long as both."""
+    return f"{folder}/frames/{HIDDEN}{os.getpid()}.usdc", f"{folder}/frames/f.{frame:06d}.usdc"
 
 
 def frame_files(folder: Path) -> list[Path]:

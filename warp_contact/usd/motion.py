@@ -1,7 +1,5 @@
 """How the motion of a body is written: by its points, or by where its frame is if it is rigid."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from pxr import Gf, Sdf, UsdGeom, Vt
 
@@ -21,18 +19,16 @@ def motion_types(part: Part) -> dict[str, Sdf.ValueTypeName]:
     return {surface + "points": types.Point3fArray, surface + "extent": types.Float3Array}
 
 
-def motion(part: Part, sim, x: np.ndarray) -> Iterator[tuple]:
-    """Their paths and values at the positions ``x`` [m] of all vertices, float32 (n_vert, 3).
+def motion(part: Part, sim, x: np.ndarray) -> tuple:
+    """Their values at the positions ``x`` [m] of all vertices, float32 (n_vert, 3).
 
     Raises:
         ValueError: a body that is rigid, and fixed, was driven out of its shape
     """
     if part.is_rigid:
-        yield from zip(motion_types(part), pose(part, sim, x), strict=True)
-        return
+        return pose(part, sim, x)
     points = Vt.Vec3fArray.FromNumpy(x[part.ids])
-    values = points, UsdGeom.PointBased.ComputeExtent(points)
-    yield from zip(motion_types(part), values, strict=True)
+    return points, UsdGeom.PointBased.ComputeExtent(points)
 
 
 def velocity_types(part: Part, model, tets: bool) -> dict[str, Sdf.ValueTypeName]:
@@ -45,17 +41,16 @@ def velocity_types(part: Part, model, tets: bool) -> dict[str, Sdf.ValueTypeName
     return {f"{mesh}.velocities": types.Vector3fArray for mesh in meshes}
 
 
-def velocities(part: Part, sim, x: np.ndarray, v: np.ndarray, tets: bool) -> Iterator[tuple]:
-    """Their paths and values, of positions ``x`` [m] and velocities ``v`` [m/s], (n_vert, 3)."""
+def velocities(part: Part, sim, x: np.ndarray, v: np.ndarray, tets: bool) -> tuple:
+    """Their values, of positions ``x`` [m] and velocities ``v`` [m/s], (n_vert, 3)."""
     own = slice(*part.verts)
-    values: tuple = ()
     if not part.is_rigid:
-        values = vectors(v[part.ids]), vectors(v[own])
-    elif solid := sim.model.solids[part.index]:
+        return vectors(v[part.ids]), *((vectors(v[own]),) if tets else ())
+    if solid := sim.model.solids[part.index]:
         translation, turn = placement(*sim.pose(part.index))
         centre = np.array(Gf.Matrix3d(turn)).T @ solid.centre + translation
-        values = rigid_motion(x[own].astype(float), v[own].astype(float), centre)
-    yield from zip(velocity_types(part, sim.model, tets), values, strict=False)
+        return rigid_motion(x[own].astype(float), v[own].astype(float), centre)
+    return ()
 
 
 def pose(part: Part, sim, x: np.ndarray) -> tuple[Gf.Vec3d, Gf.Quatd]:

@@ -4,7 +4,6 @@ It has texture coordinates, normals and a material of its own. Of a rigid body a
 once, in the frame of its mesh.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -129,13 +128,13 @@ def render_types(render: Render) -> dict[str, Sdf.ValueTypeName]:
     return {f"{render.path}.{name}": kind for name, kind in kinds.items()}
 
 
-def render_values(render: Render, sim) -> Iterator[tuple]:
-    """Their paths and values now."""
-    if not render.part.is_rigid:
-        x, normals = sim.rendered(render.part.index)
-        points = array_of(x)
-        values = points, UsdGeom.PointBased.ComputeExtent(points), array_of(normals)
-        yield from zip(render_types(render), values, strict=True)
+def render_values(render: Render, sim) -> tuple:
+    """Their values now."""
+    if render.part.is_rigid:
+        return ()
+    x, normals = sim.rendered(render.part.index)
+    points = array_of(x)
+    return points, UsdGeom.PointBased.ComputeExtent(points), array_of(normals)
 
 
 def array_of(vectors: np.ndarray) -> Vt.Vec3fArray:

@@ -18,7 +18,7 @@ rounded to a thousandth of their largest value on the body, to a 250th on those 
 some more, so that they pack to half the size. Colours are indices into a palette.
 """
 
-from functools import cache
+import os
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +28,15 @@ from warp_contact.files import renew, replacing, sync_all
 from warp_contact.usd.attachments import Attachments
 from warp_contact.usd.contacts import ContactArrows
 from warp_contact.usd.fields import field_types, field_values, hydrostatic
-from warp_contact.usd.folder import ROOT, SYNC_EVERY, TOPOLOGY, RunFolder, frame_file, frame_files
+from warp_contact.usd.folder import (
+    ROOT,
+    SYNC_EVERY,
+    TOPOLOGY,
+    RunFolder,
+    frame_file,
+    frame_files,
+    frame_names,
+)
 from warp_contact.usd.kept import check_frames, check_layers, first_frame
 from warp_contact.usd.motion import motion, motion_types, numbers, velocities, velocity_types
 from warp_contact.usd.prims import check_options, parts, shades, topology
@@ -101,8 +109,8 @@ class UsdWriter:
         """Write what does not change."""
         try:
             self.renders = renders(self.parts, self.sim)
-            self.grows, self.layer = self.scale == 0.0, self._declare()
-            self.path = cache(Sdf.Path)  # to make one takes as long as to set its value
+            self.grows, self.types = self.scale == 0.0, self._types()
+            self.layer, self.paths = self._declare(), [Sdf.Path(path) for path in self.types]
             if self.arrows:
                 self.arrows.define(prims)
             self.attachments.define(prims)
@@ -144,19 +152,14 @@ class UsdWriter:
             raise ValueError(f"{self.root} is closed: no frame can be written any more")
         if self.end is not None and frame != self.end + 1:
             raise ValueError(f"frame {frame} cannot follow frame {self.end}")
-        values = list(self._values())
-        with Sdf.ChangeBlock():
-            for path, value in values:
-                if self.end is not None:
-                    self.layer.EraseTimeSample(self.path(path), self.end)
-                self.layer.SetTimeSample(self.path(path), frame, value)
+        for path, value in zip(self.paths, list(self._values()), strict=True):
+            if self.end is not None:
+                self.layer.EraseTimeSample(path, self.end)
+            self.layer.SetTimeSample(path, frame, value)
         lengths = {"forceScale": self.arrows.scale} if self.arrows else {}
         self.layer.customLayerData = {"pressureScale": self.scale, "note": note} | lengths
-        path = frame_file(self.folder.now, frame)
-        export(self.layer, path, wait=False)
         start = frame if self.start is None else self.start
-        self._write_root(start, frame)
-        self.folder.wrote(path, self.folder.now / self.root.name)
+        self.folder.wrote(self._write_frame(frame), self._write_root(start, frame))
         if publish:
             self.folder.publish()
         self.folder.sync(SYNC_EVERY)
@@ -180,7 +183,8 @@ class UsdWriter:
         """See that the earlier file, up to the frame of the simulation, is what it should be."""
         self.start, self.end = first_frame(self.root), self.sim.frame
         check_layers(self.root, self.layer, list(self.sim.model.labels))
-        lengths = {path: len(numbers(value)) for path, value in self._values()}
+        values = zip(self.types, self._values(), strict=True)
+        lengths = {path: len(numbers(value)) for path, value in values}
         if self.arrows:
             lengths |= dict.fromkeys(self.arrows.types())  # any number of contacts
         kept = check_frames(self.root.parent, range(self.start, self.end + 1), lengths)
@@ -201,7 +205,7 @@ class UsdWriter:
                 path.unlink()
 
     def _values(self):
-        """The attributes of this frame: path and value."""
+        """The values of the attributes of this frame, in the order of ``_types``."""
         x = np.ascontiguousarray(self.sim.positions(), dtype=np.float32)
         v = np.asarray(self.sim.velocities(), dtype=np.float32) if self.velocities else None
         fields = self.sim.contact_fields()
@@ -210,61 +214,75 @@ class UsdWriter:
         shade = shades(fields["pressure"] / (self.scale or 1.0))
         for part in self.parts:
             yield from motion(part, self.sim, x)
+            yield from field_values(part, shade, fields)
             if v is not None:
                 yield from velocities(part, self.sim, x, v, self.animate_tets)
-            yield from field_values(part, shade, fields)
             if self.animate_tets and not part.is_rigid:
                 points = Vt.Vec3fArray.FromNumpy(x[slice(*part.verts)])
-                yield f"{part.path}/sim.points", points
-                yield f"{part.path}/sim.extent", UsdGeom.PointBased.ComputeExtent(points)
+                yield from (points, UsdGeom.PointBased.ComputeExtent(points))
         for render in self.renders:
             yield from render_values(render, self.sim)
         yield from self.attachments.values(self.sim)
         if self.arrows:
             yield from self.arrows.values(self.sim)
 
-    def _declare(self) -> Sdf.Layer:
-        """A layer that holds every attribute of a frame, without values."""
-        layer = Sdf.Layer.CreateAnonymous(".usdc")
-        layer.timeCodesPerSecond = layer.framesPerSecond = self.sim.fps
-        types = Sdf.ValueTypeNames
+    def _types(self) -> dict[str, Sdf.ValueTypeName]:
+        """The attributes of a frame, by their paths."""
+        types, attributes = Sdf.ValueTypeNames, dict[str, Sdf.ValueTypeName]()
         for part in self.parts:
-            attributes = motion_types(part) | field_types(part)
+            attributes |= motion_types(part) | field_types(part)
             if self.velocities:
                 attributes |= velocity_types(part, self.sim.model, self.animate_tets)
             if self.animate_tets and not part.is_rigid:
                 attributes[f"{part.path}/sim.points"] = types.Point3fArray
                 attributes[f"{part.path}/sim.extent"] = types.Float3Array
-            declare(layer, attributes)
         for render in self.renders:
-            declare(layer, render_types(render))
-        declare(layer, self.attachments.types())
-        if self.arrows:
-            declare(layer, self.arrows.types())
+            attributes |= render_types(render)
+        attributes |= self.attachments.types()
+        return attributes | (self.arrows.types() if self.arrows else {})
+
+    def _declare(self) -> Sdf.Layer:
+        """A layer that holds every attribute of a frame, without values."""
+        layer = Sdf.Layer.CreateAnonymous(".usdc")
+        layer.timeCodesPerSecond = layer.framesPerSecond = self.sim.fps
+        for path, kind in self.types.items():
+            prim, _, name = path.partition(".")
+            Sdf.AttributeSpec(Sdf.CreatePrimInLayer(layer, prim), name, kind)
         return layer
 
-    def _write_root(self, start: int, end: int) -> None:
-        """Make the root layer name the frames."""
-        renew(self.folder.now / self.root.name, ROOT.format(start=start, end=end, fps=self.sim.fps))
-
-
-def declare(layer: Sdf.Layer, attributes: dict) -> None:
-    """Let a layer hold attributes of some types, by their paths."""
-    for path, kind in attributes.items():
-        prim, _, name = path.partition(".")
-        Sdf.AttributeSpec(Sdf.CreatePrimInLayer(layer, prim), name, kind)
-
-
-def export(layer: Sdf.Layer, path: Path, wait: bool = True) -> None:
-    """Write a layer so that ``path`` is either absent, old or complete."""
-    with replacing(path, wait) as part:
+    def _write_frame(self, frame: int) -> str:
+        """Write the layer as the file of a frame, which is named."""
+        part, path = frame_names(self.folder.now, frame)
         try:
-            is_written, reason = layer.Export(str(part)), "USD does not say why"
-        except Tf.ErrorException as error:  # each of its lines ends with : 'what went wrong'
-            first = str(error).strip().partition("\n")[0]
-            is_written, reason = False, first.split(" : ")[-1].strip("'")
-        if not is_written:
-            raise OSError(f"cannot write {path}: {reason}")
+            save(self.layer, part)
+            os.replace(part, path)
+        except BaseException:
+            Path(part).unlink(missing_ok=True)
+            raise
+        return path
+
+    def _write_root(self, start: int, end: int) -> str:
+        """Make the root layer, which is named, tell of the frames."""
+        path = f"{self.folder.now}/{self.folder.root.name}"
+        renew(path, ROOT.format(start=start, end=end, fps=self.sim.fps))
+        return path
+
+
+def export(layer: Sdf.Layer, path: Path) -> None:
+    """Write a layer so that ``path`` is either absent, old or complete."""
+    with replacing(path) as part:
+        save(layer, str(part))
+
+
+def save(layer: Sdf.Layer, path: str) -> None:
+    """Write a layer; raises OSError if USD cannot."""
+    try:
+        is_written, reason = layer.Export(path), "USD does not say why"
+    except Tf.ErrorException as error:  # each of its lines ends with : 'what went wrong'
+        first = str(error).strip().partition("\n")[0]
+        is_written, reason = False, first.split(" : ")[-1].strip("'")
+    if not is_written:
+        raise OSError(f"cannot write {path}: {reason}")
 
 
 def _folder(path, overwrite: bool, resume: bool) -> RunFolder:

@@ -29,7 +29,7 @@ from warp_contact.usd.check import problems
 CODE = """import sys
 from warp_contact.command import cli, run
 run.SAVE_EVERY = 0.1
-sys.exit(cli.main(sys.argv[1:]))"""
+sys.exit(cli.main())"""
 
 
 class Trial:

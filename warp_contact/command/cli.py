@@ -20,6 +20,7 @@ from warp_contact.command import commands, run
 from warp_contact.errors import SimulationError, UsageError
 from warp_contact.picture.plot import PANELS
 from warp_contact.simulation import INTEGRATORS
+from warp_contact.usd.threads import one_thread
 
 
 class Parser(argparse.ArgumentParser):
@@ -31,7 +32,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a command and return its exit code."""
+    """Run a command and return its exit code; without ``argv`` that of this process."""
+    if argv is None:  # nobody has worked with USD in it
+        one_thread()
     try:
         args = parser().parse_args(argv)
     except SystemExit as stop:

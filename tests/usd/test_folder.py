@@ -204,6 +204,23 @@ def test_a_frame_that_found_no_room_can_be_written_later(tmp_path, monkeypatch):
     assert has_frames(tmp_path / "run", 4, sim)
 
 
+def test_a_frame_that_usd_cannot_finish_is_an_error_that_names_it(tmp_path):
+    resource, sim = pytest.importorskip("resource"), FakeSimulation(n=8)
+    limit, (soft, hard) = resource.RLIMIT_FSIZE, resource.getrlimit(resource.RLIMIT_FSIZE)
+    with UsdWriter(tmp_path / "run", sim) as writer:
+        writer.write()
+        sim.frame = 1
+        resource.setrlimit(limit, (2048, hard))  # [bytes] of a file: USD leaves it cut short
+        try:
+            with pytest.raises(OSError, match=r"cannot write .*f\.000001\.usdc: .*too large"):
+                writer.write()
+        finally:
+            resource.setrlimit(limit, (soft, hard))
+        assert [path.name for path in (tmp_path / "run" / "frames").iterdir()] == ["f.000000.usdc"]
+        writer.write()
+    assert has_frames(tmp_path / "run", 2, sim)
+
+
 def test_a_kill_at_any_moment_loses_no_frame_and_mixes_none(tmp_path, monkeypatch):
     """Before every change of the folder, in a run over an earlier one."""
     (old, new), place = two(), tmp_path / "run"

@@ -254,7 +254,7 @@ class UsdWriter:
         """Write the layer as the file of a frame, which is named."""
         part, path = frame_names(self.folder.now, frame)
         try:
-            save(self.layer, part)
+            save(self.layer, part, path)
             os.replace(part, path)
         except BaseException:
             Path(part).unlink(missing_ok=True)
@@ -271,13 +271,13 @@ class UsdWriter:
 def export(layer: Sdf.Layer, path: Path) -> None:
     """Write a layer so that ``path`` is either absent, old or complete."""
     with replacing(path) as part:
-        save(layer, str(part))
+        save(layer, str(part), path)
 
 
-def save(layer: Sdf.Layer, path: str) -> None:
-    """Write a layer; raises OSError if USD cannot."""
+def save(layer: Sdf.Layer, part: str, path: Path | str) -> None:
+    """Write a layer as ``part``, which may be cut short where the OSError names ``path``."""
     try:
-        is_written, reason = layer.Export(path), "USD does not say why"
+        is_written, reason = layer.Export(part), "USD does not say why"
     except Tf.ErrorException as error:  # each of its lines ends with : 'what went wrong'
         first = str(error).strip().partition("\n")[0]
         is_written, reason = False, first.split(" : ")[-1].strip("'")

@@ -76,9 +76,9 @@ class ContactData:
         """Per vertex: ``force`` [N] and ``pressure`` [Pa], means over the last frame, and more.
 
         Beside these ``penetration`` [m] and ``partner``, a body's index, n_body + p for plane p, -1
-        for none. Both are those of the last detection pass: at the predicted positions, after the
-        closure where it moved surfaces, at the start of the step for a penalty. Persistent contacts
-        of edges have no penetration. Shapes (n_vert,), of the force (n_vert, 3).
+        for none: of the contacts of the last step, as ``contacts()`` has them, at the predicted
+        positions, for a penalty at those at its start. Persistent contacts of edges have no
+        penetration. Shapes (n_vert,), of the force (n_vert, 3).
         """
         return contact_fields(self.model, self.state.x, self._stepper.work, 1.0 / self.fps)
 

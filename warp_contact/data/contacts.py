@@ -1,6 +1,7 @@
 """The contacts of a step, rebuilt in every step and shared by its stages."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import warp as wp
@@ -61,7 +62,7 @@ class Contacts:
             n = int(self.n.numpy()[0])
         else:
             record, impulse = self.kept.record, self.kept.impulse
-        record, impulse = record.numpy()[:n], impulse.numpy()[:n]
+        record, impulse = first(record, n), first(impulse, n)
         made = (record["coef"] != 0.0).any(axis=1)
         return record[made], impulse[made]
 
@@ -102,3 +103,16 @@ def copy(to: Contacts, of: tuple[dict[str, wp.array], KeptContacts]) -> None:
     if to.kept is not kept:
         for name, array in vars(kept).items():
             wp.copy(getattr(to.kept, name), array, count=len(array))
+
+
+def first(array: wp.array, n: int) -> np.ndarray:
+    """Copies of the first ``n`` structs of an array; ``numpy()`` takes 0.1 ms."""
+    kind = numpy_type(array.dtype)
+    data = wp.array(ptr=array.ptr, dtype=wp.uint8, shape=n * kind.itemsize, device=array.device)
+    return data.numpy().view(kind).copy()
+
+
+@cache
+def numpy_type(struct) -> np.dtype:
+    """What a struct is to NumPy."""
+    return np.dtype(struct.numpy_dtype())

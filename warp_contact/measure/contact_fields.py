@@ -9,7 +9,7 @@ from warp_contact.data.work import Work
 
 def contact_fields(model: Model, x: wp.array, work: Work, duration: float) -> dict[str, np.ndarray]:
     """Fields of the last frame, of ``duration`` [s], at positions ``x``: see ``Simulation``."""
-    c = work.contacts.record.numpy()[: int(work.contacts.n.numpy()[0])]
+    c = work.contacts.of_step()[0]
     penetration = np.zeros(model.n_vert, dtype=np.float32)
     partner = np.full(model.n_vert, -1, dtype=np.int32)
     k, of = np.nonzero(c["coef"].T)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from warp_contact.data.contacts import first
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.ties import TieWork
@@ -259,7 +260,7 @@ class Meter:
 
 def _held(work: Work) -> np.ndarray:
     """Vertices that a contact of the last step moved out of another body or plane."""
-    last = work.contacts.record.numpy()[: int(work.contacts.n.numpy()[0])]  # of a second look
-    contacts = np.concatenate([last, work.contacts.of_step()[0]])
+    looked = first(work.contacts.record, int(work.contacts.n.numpy()[0]))  # a second time, or once
+    contacts = np.concatenate([looked, work.contacts.of_step()[0]])
     own = contacts["vert"][:, :2]  # the others are those of the other side
     return own[contacts["coef"][:, :2] != 0.0]

@@ -33,7 +33,8 @@ so that other processes on the machine hardly count; those of frames and starts 
 spheres of which N pairs touch; what contact adds to a step beyond that of ``pairs_0`` is about
 ``pairs.any_ms + N pairs.each_ms``. ``sleep`` are frames of 32 blocks in 16 columns: while they
 settle, at rest, and asleep, with how far sleep let them come from where they else are [edges].
-``writer`` are frames of scenes and what a ``UsdWriter`` takes for each, in the folder of the call.
+``writer`` are frames of scenes and what a ``UsdWriter`` takes for each, in the folder of the call,
+with one thread of USD as in ``warp-contact run``; ``PXR_WORK_THREAD_LIMIT=0`` lets it have all.
 ``start.import_s`` is the import of the package; ``start.warm_frame_s`` and ``start.cold_frame_s``
 are the first frame after it, the scene included, with and without kernels compiled before.
 """
@@ -50,6 +51,7 @@ from measure import machine
 from measure.run import command_line, count, one_of
 
 from warp_contact.frame.integrator import KINDS
+from warp_contact.usd.threads import one_thread
 
 # cases with figures of their own
 OTHERS = {"sleep": sleep_figures, "writer": writer_figures, "start": start_times}
@@ -109,4 +111,5 @@ def summary(found: dict[str, float], timed: dict[str, Case]) -> dict[str, float]
 
 
 if __name__ == "__main__":
+    one_thread()  # as ``warp-contact run``
     sys.exit(main())

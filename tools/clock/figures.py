@@ -1,5 +1,6 @@
 """The figures of a case, of sleep and of a start by name; what they are: ``tools/bench.py``."""
 
+import gc
 import os
 import resource
 import subprocess
@@ -127,6 +128,7 @@ def writer_figures(device: str | None) -> dict[str, float]:
     for name, case in ((n, c) for n, c in cases(False, FRACTION).items() if n in WRITTEN):
         sim, spent = wc.Simulation(case.build(), device=device), np.zeros((2, 2))
         sim.step_frame()
+        gc.collect()  # what the scene before has left
         with tempfile.TemporaryDirectory(dir=".") as folder, wc.UsdWriter(folder, sim) as usd:
             for _ in range(WRITTEN_FRAMES):
                 for row, act in zip(spent, (sim.step_frame, usd.write), strict=True):

@@ -183,7 +183,10 @@ def _records(work) -> SimpleNamespace:
 
 @pytest.fixture
 def find_contacts():
-    """Contacts where they are looked for, ``find_contacts(model, work, x0, x, edges, apart)``."""
+    """Contacts at ``x`` in a step from ``x0``, by stages 2 to 4, as ``records`` has them.
+
+    ``find_contacts(model, work, x0, x, edges, apart)``; ``apart`` as in ``kernels/worlds.py``.
+    """
     return _find_contacts
 
 

@@ -1,6 +1,6 @@
 """Stage 2, broad phase: pairs that hold while nothing moves further than a skin (Verlet 1967).
 
-Pairs are found at the positions of some step and kept for many steps. As long as no vertex is
+Pairs are found half way of some step and kept for many steps. As long as no vertex is
 further from there than the skin of its body, the pairs include all contacts. Each step tests them
 exactly, so it finds the same contacts as with new pairs. New pairs are found once the predicted
 position of a vertex is further away than ``free``. The rest of the skin is a reserve for what
@@ -40,7 +40,7 @@ SHORTEST = wp.constant(1.0)  # steps
 LONGEST = wp.constant(32.0)  # steps
 MOTION_UNIT = wp.constant(1.0e4)  # counts of an edge: a sum of integers has no order
 FASTER = wp.constant(3.0)  # reserves in a step: the body was slower when its pairs were found
-PART = wp.constant(1.0 / 7.0)  # of what is free: the reserve is an eighth of the skin, see SURE
+PART = wp.constant(1.0 / 7.0)  # of what is free: an eighth of the skin, as SURE of edges assumes
 ROUNDING = wp.constant(1.01)  # of what is free: a body that moves as predicted stays within it
 CAREFUL = wp.constant(0.99)  # part of a distance that is safe from rounding
 FADING = wp.constant(0.8)  # of a recorded motion from one detection pass to the next
@@ -53,7 +53,7 @@ def moved(
     vert_body: wp.array[int],  # (n_vert,)
     free: wp.array[float],  # (n_body,) [m]
     skin: wp.array[float],  # (n_body,) [m]
-    built: wp.array[wp.vec3],  # (n_vert,) [m] positions at which the pairs were found
+    built: wp.array[wp.vec3],  # (n_vert,) [m] half way of the step in which pairs were found
     x0: wp.array[wp.vec3],  # (n_vert,) [m]
     x1: wp.array[wp.vec3],  # (n_vert,) [m]
     # out, added to

@@ -1,9 +1,11 @@
 """Stage 1 of bodies that take implicit steps.
 
-    A dv = P^T (h (f - C v) - T h^2 K u) + h m g,   v' = v + P dv + h g               [kg m/s]
+    A dv = P^T (h (f + l - C v) - T h^2 K u),   v' = v + P dv + h (g + a)   without fixed vertices
+    A dv = h (f + l - C v + m g) - T h^2 K u,   v' = v + dv                 with some [kg m/s]
     u = v - G (M v - (A v_c))                   motion that the step does not resolve  [m/s]
 
-f are the internal forces at x, v_c the velocities of fixed vertices. With T = 0 the step is the
+f are the internal forces at x, l is what was lacking (settle.py), a comes of forces from outside,
+v_c are the velocities of fixed vertices. With T = 0 the step is the
 trapezoidal rule for small motions (Newmark 1959, beta = 1/4 to 1/2): it damps nothing, and what is
 faster than the step may gain energy where shapes change. u is what an implicit step would take out
 of v: all of a motion with z = (h omega)^2 >> 1, a part z of one with z << 1. T = 1 damps it by
@@ -155,7 +157,7 @@ def kick(
     # in, out
     v: wp.array[wp.vec3],  # (n_vert,) [m/s]
 ):
-    """One thread per vertex: add what comes about in the time dt; to a lumped body pushes alone."""
+    """One thread per vertex: add dv in the time dt; to a lumped body only forces from outside."""
     i = wp.tid()
     b = d.vert_body[i]
     if is_pushed(b, d):

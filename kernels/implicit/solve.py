@@ -31,7 +31,7 @@ ITERATIONS = wp.constant(16)  # at most: two are usual
 class Iteration:
     """Where the iterations of each body are."""
 
-    going: wp.array[int]  # (n_body,) its number, 0 where it has ended
+    going: wp.array[int]  # (n_body,) its number; 0 where it has ended, -1 where it is about to
     enough: wp.array[wp.float64]  # (n_body,) r . G r at which it ends [J]
     now: wp.array[wp.float64]  # (n_body,) the same now [J]
 
@@ -137,7 +137,7 @@ def go(
         along = wp.float32(to.now[b] / curvature)
     else:
         if to.going[b] == 1:
-            along = 1.0
+            along = 1.0  # G r, what the shape at rest would do
         to.going[b] = -1
     for i in range(first, last):
         dv[i] = dv[i] + along * p[i]

@@ -1,7 +1,7 @@
 """Stage 5, impulses: normal impulses and Coulomb friction, all contacts at once, by mass splitting.
 
     u = sum a_k v_k                              relative velocity              [m/s]
-    lambda <- max(0, lambda - (u . n + c) / W_t) c > 0: the gap that may close  [N s]
+    lambda <- max(0, lambda - (u . n + c) / W_t) c > 0: how fast it may close  [N s]
     p_t <- p_t - u_t / W_t, |p_t| <= mu lambda                                  [N s]
     v_k += a_k (d lambda n + d p_t) / m_k        with the whole mass
 
@@ -85,7 +85,7 @@ def surface_velocity(c: Contact, to: Constraint, v: wp.array[wp.vec3]) -> wp.vec
 def projected(
     before: Impulse, u: wp.vec3, un: float, excess: float, n: wp.vec3, to: Constraint, w: float
 ) -> Impulse:
-    """The impulses of a sweep, those that are allowed next to a step of 1 / w from ``ahead``."""
+    """The allowed impulses nearest to a step from ``ahead``, by 1 / w against the velocity."""
     y = before.ahead
     new = Impulse()
     new.normal = wp.max(y[3] - excess / w, 0.0)
@@ -123,7 +123,7 @@ def add_to_parts(
     part: wp.array[wp.vec3],
     served: wp.array[int],
 ) -> wp.vec3:
-    """Set the parts of contact c by which its impulses change; the sum of both [N s]."""
+    """Set the parts of contact c for a change of its impulses; that of both together [N s]."""
     p = (after[3] - before[3]) * at.normal + wp.vec3(after[0], after[1], after[2])
     p -= wp.vec3(before[0], before[1], before[2])
     for k in range(5):

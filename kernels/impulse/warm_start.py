@@ -70,7 +70,7 @@ def recall_vertices(
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
     partner: wp.array[int],  # (n_vert,) body of the first contact in the last step, or -1
-    kept: wp.array[wp.vec4],  # (n_vert,) [N s] its tangential and normal impulse
+    kept: wp.array[wp.vec4],  # (n_vert,) [N s] its impulses, [N] in implicit steps
     # in, out
     impulse: wp.array[Impulse],  # (capacity,)
     # out
@@ -126,7 +126,7 @@ def keep_vertices(
     impulse: wp.array[Impulse],  # (capacity,)
     # out
     partner: wp.array[int],  # (n_vert,)
-    kept: wp.array[wp.vec4],  # (n_vert,) [N s]
+    kept: wp.array[wp.vec4],  # (n_vert,) [N s], [N] in implicit steps
 ):
     """For each contact of a vertex that is its first: keep its impulses."""
     n = wp.min(n_vertex[0], contact.shape[0])

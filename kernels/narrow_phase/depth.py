@@ -15,6 +15,10 @@ The others take both from neighbours p_j that have a depth, layer by layer, m_j 
 All tet edges take part. With surface edges alone, a vertex inside a flat face would have in-plane
 neighbours only. Terms with (x_k - p) . n_k <= 0 leave by a side that faces away and are dropped. So
 are terms through a face that no face of the vertex opposes (opposing.py).
+
+The direction makes the contact. The depth only says whether the ray along it is trusted
+(vertex_contact.py), whose length replaces it, and goes on to the next layer. Most vertices that lie
+shallow, as at rest, take the closest triangles instead (shallow.py).
 """
 
 import warp as wp

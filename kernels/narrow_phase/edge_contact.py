@@ -79,7 +79,7 @@ class EdgeContact:
     edge: int  # pq itself
     body: int  # N
     next: int  # place of another contact of this edge and N, -1 for none
-    kept: wp.vec4  # [N s] tangential and normal impulse so far
+    kept: wp.vec4  # [N s], [N] in implicit steps: tangential and normal impulse so far
 
 
 @wp.func

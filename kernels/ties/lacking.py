@@ -23,8 +23,8 @@ def make_up(
 ):
     """One thread per body: add a part of p - A y to what an attached one was lacking.
 
-    It is held wherever it yields: only a part is made up for in each step, less where it is large
-    against p, as impulses may answer it by more than itself where the body is softer than at rest.
+    Where the body is softer than at rest it answers that by more than itself, which its ties take
+    up again: so only a part is made up for in each step, less where it is large against p.
     """
     b = wp.tid()
     first = d.body_vert[b]

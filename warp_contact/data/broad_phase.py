@@ -62,7 +62,7 @@ class BroadPhase:
     """What may touch as long as no vertex is further than the skin of its body from ``x``.
 
     Attributes:
-        x: positions at which the pairs were found [m], shape (n_vert,)
+        x: half way of the step in which the pairs were found [m], shape (n_vert,)
         free: how far from ``x`` a prediction may be [m], shape (n_body,)
         skin: how far from ``x`` the pairs hold [m], shape (n_body,)
         age: steps since the pairs were found, shape (1,)

@@ -18,7 +18,7 @@ class WarmStart:
 
     Attributes:
         partner: body of each vertex' first contact in the last step, -1 for none, shape (n_vert,)
-        kept: tangential and normal impulse of that contact [N s], shape (n_vert,)
+        kept: its tangential and normal impulse [N s], over h [N] in implicit steps, shape (n_vert,)
         n_edge: contacts of edges in the last step, shape (1,)
         edges: these, with their impulses, sorted by edge and body, shape (capacity.contacts,)
         lacking: what the answer of implicit bodies to the contacts of the last step lacked [N],

@@ -131,7 +131,8 @@ class Stepper:
                 after, wrong = self._run(rates, frame, in_parts)
             full = enlarged(self.work) is not None  # what explodes never grows
             self._cut = self._cut or full
-            counts = self._explode(rates, after) | (not full)  # worlds of which the frame tells
+            # Full buffers tell nothing of a world but that it explodes.
+            counts = self._explode(rates, after) | (not full)
             fits = self._fit(rates, after) | ~counts
             flat = in_parts | (counts & (self._flat() | ~np.isfinite(after).all(axis=0)))
             again = flat & ~in_parts
@@ -146,7 +147,7 @@ class Stepper:
             higher = step_bounds.repeated(rates, after, self._dt, in_parts)
             rates, in_parts = np.where(fits, rates, higher), flat
         stiffest = self._model.labels[int(self.spectrum.of_bodies[0].argmax())]
-        raise SimulationError(f"frame {frame}: no step is stable, not for body '{stiffest}'")
+        raise SimulationError(f"frame {frame}: no step is short enough for body '{stiffest}'")
 
     def _flat(self) -> np.ndarray:
         """Worlds in which a tet was flat at the last check; none where steps are not free."""

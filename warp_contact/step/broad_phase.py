@@ -20,7 +20,7 @@ from warp_contact.step.ties import keep_apart
 
 
 def refresh(model: Model, x0: wp.array, x1: wp.array, work: Work) -> None:
-    """Find the pairs at ``x0`` unless the present ones hold for a step from ``x0`` to ``x1``."""
+    """Find the pairs half way from ``x0`` to ``x1``, unless the present ones hold that step."""
     b = work.broad_phase
     if not on("broad phase kept"):
         b.stale.fill_(1)

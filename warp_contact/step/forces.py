@@ -8,8 +8,8 @@ from warp_contact.data.model import Model
 def internal_forces(model: Model, x: wp.array, mask: wp.array, f_tet: wp.array) -> None:
     """Set ``f_tet`` [N], shape (4 n_tet,), of the tets where ``mask`` is not 0.
 
-    Undamped forces on the corners of each tet at the positions ``x`` [m]. ``motion.gather`` and
-    ``motion.predict`` sum them over the tets of a vertex. One launch per material model.
+    Undamped forces on the corners of each tet at the positions ``x`` [m]. ``motion.kick`` and
+    ``predict.sum_forces`` sum them over the tets of a vertex. One launch per material model.
     """
     for e in model.elements:
         wp.launch(

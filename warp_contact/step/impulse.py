@@ -86,7 +86,7 @@ def solve_half_step(model: Model, state: State, work: Work) -> None:
         _find_strikes(model, work)
         inputs, outputs = [work.contacts.n, work.rebound.strike], [work.contacts.constraint]
         launch_over(strike.leave_open, work.capacity.contacts, inputs=inputs, outputs=outputs)
-    share = 1.0 if work.implicit else 0.5  # implicit steps keep forces
+    share = 1.0 if work.implicit else 0.5  # those of implicit steps are kept as forces
     warm_start.recall_edges(work, share)
     warm_start.recall_vertices(work, share)
     apply(model, state.v, work)

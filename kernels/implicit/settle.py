@@ -43,14 +43,14 @@ class Settling:
 def begin(
     # out
     to: Settling,
-    bodies: wp.array[int],  # (1,) that need a pass
+    unsettled: wp.array[int],  # (1,) bodies that need a pass
 ):
     """One thread per body: no pass yet."""
     b = wp.tid()
     to.left[b] = wp.inf
     if b == 0:
         to.passes[0] = 0
-        bodies[0] = 0
+        unsettled[0] = 0
 
 
 @wp.kernel
@@ -58,11 +58,11 @@ def next_pass(
     # in, out
     to: Settling,
     # out
-    bodies: wp.array[int],  # (1,) that need a pass
+    unsettled: wp.array[int],  # (1,) bodies that need a pass
 ):
     """One thread: a pass begins."""
     to.passes[0] = to.passes[0] + 1
-    bodies[0] = 0
+    unsettled[0] = 0
 
 
 @wp.kernel
@@ -79,7 +79,7 @@ def find_lacking(
     lacking: wp.array[wp.vec3],  # (n_vert,) [N] q / h where it is small, else 0
     q: wp.array[wp.vec3],  # (n_vert,) [N s] where it needs a pass, else 0
     # out, added to
-    bodies: wp.array[int],  # (1,) that need a pass
+    unsettled: wp.array[int],  # (1,) bodies that need a pass
 ):
     """One thread per body: what it lacks, and whether that needs a pass; of attached ones none."""
     b = wp.tid()
@@ -105,7 +105,7 @@ def find_lacking(
     again = ratio > SMALL and ratio < SMALLER * to.left[b] and to.passes[0] < PASSES
     to.left[b] = ratio
     if again:
-        wp.atomic_add(bodies, 0, 1)
+        wp.atomic_add(unsettled, 0, 1)
         worlds.open[worlds.of_vert[first]] = FIRST_LOOK
     for i in range(first, last):
         lacking[i] = wp.vec3(0.0, 0.0, 0.0)

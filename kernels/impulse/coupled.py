@@ -12,11 +12,11 @@ from warp_contact.kernels.implicit.bodies import LUMPED, Implicit
 from warp_contact.kernels.impulse.constraint import Constraint, Impulse, least_closing
 from warp_contact.kernels.impulse.impulse import (
     Limits,
-    add_to_parts,
     ahead_of,
     clear_parts,
     is_quiet,
     projected,
+    set_parts,
     surface_velocity,
 )
 from warp_contact.kernels.impulse.rows import RECOUNT, row_weight
@@ -120,7 +120,7 @@ def solve_contacts(
         if not last:
             beta = limits.extrapolation * float(sweep - 1) / float(sweep + 2)
         new.ahead = ahead_of(new, before, beta)
-        change = add_to_parts(c, at, to, before.ahead, new.ahead, sweep, part, served)
+        change = set_parts(c, at, to, before.ahead, new.ahead, sweep, part, served)
         negligible = worlds.negligible[world]
         busy[c] = wp.where(wp.length(change) * w * h > negligible, 2, 1)
         impulse[c] = new

@@ -113,7 +113,7 @@ def ahead_of(new: Impulse, before: Impulse, beta: float) -> wp.vec4:
 
 
 @wp.func
-def add_to_parts(
+def set_parts(
     c: int,
     at: Contact,
     to: Constraint,
@@ -185,7 +185,7 @@ def solve_contacts(
         if not last:
             beta = limits.extrapolation * float(sweep - 1) / float(sweep + 2)
         new.ahead = ahead_of(new, before, beta)
-        change = add_to_parts(c, at, to, before.ahead, new.ahead, sweep, part, served)
+        change = set_parts(c, at, to, before.ahead, new.ahead, sweep, part, served)
         negligible = worlds.negligible[world]
         busy[c] = wp.where(wp.length(change) * w * dt[at.vert[0]] > negligible, 2, 1)
         impulse[c] = new

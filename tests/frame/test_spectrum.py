@@ -7,7 +7,7 @@ import warp as wp
 from warp_contact import Scene, Simulation, SimulationError
 from warp_contact import box as block
 from warp_contact.frame.spectrum import Spectrum
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 from warp_contact.scene.materials import Corotated, NeoHookean, SpringNetwork
 from warp_contact.step import forces
 
@@ -244,7 +244,7 @@ def test_a_world_that_is_lost_leaves_no_trace_in_others(blob, build_model, times
     x, tets = blob((2, 2, 1))
     alone, both = build_model((x, tets, MATERIALS[0])), build_model(*2 * [(x, tets, MATERIALS[0])])
     alone.body_world, both.body_world = wp.array([3], dtype=int), wp.array([3, 5], dtype=int)
-    one, two = Spectrum(alone), Spectrum(both, Worlds(both))
+    one, two = Spectrum(alone), Spectrum(both, WorldIds(both))
     for k in range(6):
         y = x * [1.0, 1.0, 1.0 + 0.1 * k]
         other = times * y if k in (1, 2) else y

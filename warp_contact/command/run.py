@@ -137,7 +137,7 @@ def go_on(sim: Simulation, root: Path) -> None:
     if not saved.is_file():
         raise ValueError(f"nothing to resume: no file {saved}")
     x, begun = sim.positions(), figures(sim.measure())
-    wanted = {}
+    wanted: dict[str, np.ndarray] = {}
     for part in parts(sim.model):
         wanted |= zip(motion_types(part), map(numbers, motion(part, sim, x)), strict=True)
     sim.load(saved)

@@ -36,9 +36,9 @@ class Shapes:
         rest: vertices of the shape of each body from its centre of mass [m], shape (n_vert, 3)
         inertia: moments of inertia about it [kg m^2], shape (n_body, 3, 3)
         force, torque: that act on bodies from outside [N], [N m], shape (n_body,)
-        lumped: bodies that take explicit steps beside the others, a mask, shape (n_body,)
+        too_large: bodies that take explicit steps beside the others, a mask, shape (n_body,)
         explicit: the model with the tets of these alone, where only they move
-        implicit: the model with the tets of the others
+        deforming: the model with the tets of the others
     """
 
     kind: np.ndarray
@@ -49,9 +49,9 @@ class Shapes:
     inertia: np.ndarray
     force: wp.array
     torque: wp.array
-    lumped: np.ndarray
+    too_large: np.ndarray
     explicit: Model
-    implicit: Model
+    deforming: Model
 
 
 @dataclass
@@ -61,7 +61,7 @@ class ImplicitWork:
     Attributes:
         bodies: what kernels know of them
         deforming: the model with their tets alone
-        lumped: that of bodies that take explicit steps beside them; None where none does
+        explicit: that of bodies that take explicit steps beside them; None where none does
         x: positions at which the mobilities are [m], shape (n_vert,)
         any_deforming: whether some of them deform; else none of the stages for these run
         any_held: whether some of them have fixed vertices
@@ -93,7 +93,7 @@ class ImplicitWork:
 
     bodies: Implicit
     deforming: Model
-    lumped: Model | None
+    explicit: Model | None
     x: wp.array[wp.vec3]
     any_deforming: bool
     any_held: bool
@@ -135,14 +135,14 @@ class ImplicitWork:
 def allocate(model: Model, shapes: Shapes, awake: Awake, n_contact: int) -> ImplicitWork:
     """Allocate for the bodies that take implicit steps; ``set_blocks`` gives the mobilities."""
     n, n_tet = model.n_vert, model.n_tet
-    damped = any(e.damped for e in shapes.implicit.elements)
+    damped = any(e.damped for e in shapes.deforming.elements)
     names = ["x", "f", "r", "z", "p", "ap", "dv", "y", "impulse", "answer", "before"]
     names += "predicted", "total"
     vectors = {k: wp.zeros(n, dtype=wp.vec3) for k in names}
     return ImplicitWork(
         bodies=_bodies(model, shapes, awake),
-        deforming=shapes.implicit,
-        lumped=shapes.explicit if shapes.lumped.any() else None,
+        deforming=shapes.deforming,
+        explicit=shapes.explicit if shapes.too_large.any() else None,
         any_deforming=bool((shapes.of_body >= 0).any()),
         any_held=bool((shapes.kind == int(HELD)).any()),
         soft=_soft(model, shapes),

@@ -27,7 +27,7 @@ def mesh_of(model: Model, surface: wp.Bvh) -> Mesh:
     return mesh
 
 
-def mobility_of(model: Model, rows: bool) -> Mobility:
+def mobilities_of(model: Model, rows: bool) -> Mobility:
     """How the vertices answer an impulse; with ``rows`` where some bodies take implicit steps."""
     mobility = Mobility()
     mobility.inv_mass = model.inv_mass

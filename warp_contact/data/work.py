@@ -20,7 +20,7 @@ from warp_contact.data import (
 )
 from warp_contact.data.model import Model
 from warp_contact.data.state import Awake, State
-from warp_contact.data.structs import mesh_of, mobility_of, n_world, worlds_of
+from warp_contact.data.structs import mesh_of, mobilities_of, n_world, worlds_of
 from warp_contact.data.ties import TieWork
 from warp_contact.kernels.mesh import Mesh
 from warp_contact.kernels.mobility import Mobility
@@ -115,7 +115,7 @@ def allocate_work(
         steps=wp.zeros(1, dtype=int),
         awake=awake,
         mesh=mesh_of(model, broad.surface),
-        mobility=mobility_of(model, rows=shapes is not None),
+        mobility=mobilities_of(model, rows=shapes is not None),
         worlds=worlds_of(model, of_surface, narrow.has_new, forces.unsolved),
         scan=scan.allocate(
             max(2 * n + 2, model.n_edge + 1, capacity.verts + 1, capacity.edges + 1)

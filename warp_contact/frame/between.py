@@ -50,7 +50,7 @@ def set_velocities(
         v[at] = values + gained.v.numpy()[at]
         return state.v.assign(v)
     v[at] = values
-    awake = everything(work.implicit.lumped or model)
+    awake = everything(work.implicit.explicit or model)
     for _ in range(ROUNDS):  # what half a step adds depends on the velocity, by less than itself
         now = State(state.x, wp.array(v, dtype=wp.vec3))
         shift_velocities(model, now, work, awake, 0.5 * dt)
@@ -70,7 +70,7 @@ def change_gravity(
     """
     moving = np.flatnonzero(model.inv_mass.numpy() > 0.0)
     now = State(state.x, wp.clone(state.v))
-    awake = everything(work.implicit.lumped or model if work.implicit else model)
+    awake = everything(work.implicit.explicit or model if work.implicit else model)
     shift_velocities(model, now, work, awake, 0.5 * dt)
     change()
     if dt.any():

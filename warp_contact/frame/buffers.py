@@ -11,7 +11,7 @@ from warp_contact.data.state import Awake, State
 from warp_contact.data.work import Work, allocate_work, let_rebound
 from warp_contact.frame.implicit_shapes import Inverses
 from warp_contact.frame.integrator import refuse_restitution
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 from warp_contact.step.loop import step_of, take_steps
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 from warp_contact.step.ties import begin_frame
@@ -36,14 +36,14 @@ class Buffers:
         state: State,
         response: ContactSurface | Penalty | PredictedForce,
         awake: Awake | None,
-        worlds: Worlds,
+        worlds: WorldIds,
         shapes: Shapes | None,
     ):
         """Allocate on the current device; ``awake`` is what moves, None for everything."""
         self._worlds, self.shapes = worlds, shapes
         self._inverses = Inverses(model, shapes) if shapes else None
         self._steps = np.zeros(0)  # of the bodies, that the mobilities are for [s]
-        self._ties = ties.allocate(model, shapes.lumped) if shapes else None
+        self._ties = ties.allocate(model, shapes.too_large) if shapes else None
         self._model, self._state, self._awake = model, state, awake
         self.response = response
         inv_mass = model.inv_mass.numpy()

@@ -16,7 +16,7 @@ from warp_contact.data.state import State
 from warp_contact.frame import implicit_shapes, step_bounds
 from warp_contact.frame.implicit_shapes import mobile, too_large
 from warp_contact.frame.spectrum import Spectrum
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
 KINDS = "explicit", "implicit", "auto"
@@ -135,7 +135,7 @@ def _speeds(model: Model, state: State) -> np.ndarray:
     passed by nothing, and passes no floor.
     """
     x, v = state.x.numpy().astype(np.float64), state.v.numpy().astype(np.float64)
-    g, worlds = model.g.numpy()[0].astype(np.float64), Worlds(model)
+    g, worlds = model.g.numpy()[0].astype(np.float64), WorldIds(model)
     down = g / max(float(np.linalg.norm(g)), 1e-30)
     along = np.column_stack([v, x @ down])
     most, least = np.full((2, worlds.n, 4), -np.inf)

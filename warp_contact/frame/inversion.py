@@ -16,7 +16,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.frame import elements
 from warp_contact.frame.step_bounds import served
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 from warp_contact.step.forces import apply_stiffness
 
 FLAT = 0.1  # of its volume at rest: a tet with less is flat
@@ -29,7 +29,7 @@ KEPT = 0.5  # part of the steps that the next frame takes at least
 class Inversion:
     """How flat the tets of each world are, and how often a frame was repeated for it."""
 
-    def __init__(self, model: Model, worlds: Worlds, shapes: Shapes | None):
+    def __init__(self, model: Model, worlds: WorldIds, shapes: Shapes | None):
         """Read the tets once, but for those of bodies that take explicit steps.
 
         These have frequencies for it; without ``shapes`` all have.
@@ -38,7 +38,7 @@ class Inversion:
         tets, volume = model.tets.numpy(), 6.0 * model.volume.numpy().astype(np.float64)
         body = model.vert_body.numpy()
         of_tet = body[tets[:, 0]]
-        lumped = shapes.lumped if shapes else np.ones(model.n_body, dtype=bool)
+        lumped = shapes.too_large if shapes else np.ones(model.n_body, dtype=bool)
         own = np.flatnonzero(~lumped[of_tet])
         self._tets, self._volume = tets[own], volume[own]
         self._pose = model.pose.numpy()[own].astype(np.float64)

@@ -3,13 +3,13 @@
 import numpy as np
 
 from warp_contact.data.model import Model
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 
 SECOND = 0.3  # part of the second mode in a restart, so that it can overtake
 SEED = 20051125
 
 
-def start_vectors(model: Model, worlds: Worlds) -> np.ndarray:
+def start_vectors(model: Model, worlds: WorldIds) -> np.ndarray:
     """Random vectors of mass norm 1 for each body, whatever other worlds there are: (n_vert, 3)."""
     u = np.empty((model.n_vert, 3))
     ends = np.cumsum(np.bincount(worlds.of_vert))

@@ -11,11 +11,11 @@ import numpy as np
 
 from warp_contact.data.model import Model
 from warp_contact.frame.implicit_shapes import mobile
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 from warp_contact.kernels.implicit.bodies import RIGID
 
 
-def reaches(model: Model, worlds: Worlds, kind: np.ndarray) -> np.ndarray:
+def reaches(model: Model, worlds: WorldIds, kind: np.ndarray) -> np.ndarray:
     """Lengths of which a part may be moved against each body in a step [m], shape (n_body,).
 
     ``kind`` is that of each body, see ``kernels/implicit/bodies.py``.

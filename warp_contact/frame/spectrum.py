@@ -8,7 +8,7 @@ import warp as wp
 from warp_contact.data.implicit import Shapes
 from warp_contact.data.model import Model
 from warp_contact.frame.krylov import ritz_pairs, start_vectors
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 from warp_contact.kernels.elastic import neo_hookean, shape
 from warp_contact.kernels.motion import lanczos
 from warp_contact.step import forces
@@ -43,16 +43,16 @@ class Spectrum:
             times in a few steps, shape (n_world,)
     """
 
-    def __init__(self, model: Model, worlds: Worlds | None = None, shapes: Shapes | None = None):
+    def __init__(self, model: Model, worlds: WorldIds | None = None, shapes: Shapes | None = None):
         """Allocate about 160 bytes per vertex and 84 per tet on the current device.
 
         ``worlds`` are those that do not depend on each other; without them all bodies are one.
         Where there are ``shapes``, only bodies that are lumped limit the step: no other is looked
         at, and nothing is done where there are none.
         """
-        self._counts = shapes.lumped if shapes else np.ones(model.n_body, dtype=bool)
+        self._counts = shapes.too_large if shapes else np.ones(model.n_body, dtype=bool)
         self._model = model = shapes.explicit if shapes else model
-        self.worlds = worlds or Worlds(model, apart=False)
+        self.worlds = worlds or WorldIds(model, apart=False)
         chunk, body_chunk = _chunks(model.body_vert.numpy())
         self._chunk = wp.array(chunk, dtype=int)
         self._body_chunk = wp.array(body_chunk, dtype=int)

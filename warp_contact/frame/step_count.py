@@ -11,7 +11,7 @@ from warp_contact.frame.diagnosis import flattest_tet
 from warp_contact.frame.implicit_shapes import largest_mobilities
 from warp_contact.frame.last_frame import LastFrame
 from warp_contact.frame.reach import reaches
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 from warp_contact.frame.wrench import Wrench
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
@@ -35,7 +35,7 @@ class StepCount:
         fps: float,
         wanted: int | None,
         most: int,
-        worlds: Worlds,
+        worlds: WorldIds,
         shapes: Shapes | None = None,
     ):
         """Read sizes of the bodies once; without ``shapes`` all take explicit steps."""
@@ -48,7 +48,7 @@ class StepCount:
         self._rate = step_bounds.ONE_PASS if one_pass else step_bounds.RESOLVED
         self._leaves = not isinstance(response, ContactSurface) or response.search == "literal"
         self._worlds = worlds
-        explicit = shapes.lumped if shapes else np.ones(model.n_body, dtype=bool)
+        explicit = shapes.too_large if shapes else np.ones(model.n_body, dtype=bool)
         sizes = np.stack([model.body_thickness.numpy(), model.body_edge.numpy()])
         self._sizes = -worlds.most(np.where(explicit, -sizes.astype(np.float64), -np.inf))
         self._reach = model.body_thickness.numpy().astype(np.float64)

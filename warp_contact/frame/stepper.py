@@ -26,7 +26,7 @@ from warp_contact.frame.sleeping import Sleeping
 from warp_contact.frame.spectrum import Spectrum
 from warp_contact.frame.step_count import StepCount
 from warp_contact.frame.turns import Turns, segments
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 from warp_contact.frame.wrench import Wrench
 from warp_contact.step.response import ContactSurface, Penalty, PredictedForce
 
@@ -63,7 +63,7 @@ class Stepper:
     ):
         """Allocate what steps need on the current device; without ``shapes`` all are explicit."""
         self.fps, self.wanted, self._model, self._state = fps, wanted, model, state
-        self.worlds = Worlds(model)
+        self.worlds = WorldIds(model)
         self.last = none_yet(self.worlds.n)
         self.first = state.x.numpy().copy(), state.v.numpy().copy()
         self._step_count = StepCount(model, response, fps, wanted, most, self.worlds, shapes)

@@ -15,7 +15,7 @@ import warp as wp
 from warp_contact.data.model import Model
 from warp_contact.data.work import Work, everything
 from warp_contact.frame.frame_start import FrameStart
-from warp_contact.frame.worlds import Worlds
+from warp_contact.frame.worlds import WorldIds
 
 
 class Turns:
@@ -28,7 +28,7 @@ class Turns:
         idle: worlds of which all bodies sleep, shape (n_world,)
     """
 
-    def __init__(self, model: Model, worlds: Worlds, may_sleep: bool):
+    def __init__(self, model: Model, worlds: WorldIds, may_sleep: bool):
         """All have begun, nothing sleeps; in the ``model`` moves what takes explicit steps."""
         self._model, self.worlds, self.inv_mass = model, worlds, model.inv_mass
         self.awake = everything(model)
@@ -89,7 +89,7 @@ def segments(
 ) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
     """Numbers of steps to take at once, which worlds have begun by then, and which to look at then.
 
-    ``n`` are the steps of each world in the frame, shape (n,), 0 for one that sleeps. Worlds
+    ``n`` are the steps of each world in the frame, shape (n,), 0 for one that sleeps. WorldIds
     ``in_parts``, a mask, are looked at after every ``part`` steps of their own: what others do must
     not decide when. At the end of the frame all are, None.
     """

@@ -5,7 +5,7 @@ import numpy as np
 from warp_contact.data.model import Model
 
 
-class Worlds:
+class WorldIds:
     """Numbers the worlds from 0 on, whatever the user called them.
 
     Attributes:

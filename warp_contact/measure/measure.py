@@ -169,9 +169,9 @@ class Meter:
 
     def _lumped(self, work: Work) -> np.ndarray:
         """Vertices of bodies that take explicit steps beside implicit ones, a mask, (n_vert,)."""
-        if not work.implicit.lumped:
+        if not work.implicit.explicit:
             return np.zeros(self.model.n_vert, dtype=bool)
-        moving = self._body[work.implicit.lumped.inv_mass.numpy() > 0.0]
+        moving = self._body[work.implicit.explicit.inv_mass.numpy() > 0.0]
         return np.isin(self._body, moving)
 
     def _forces(self, x: wp.array) -> np.ndarray:

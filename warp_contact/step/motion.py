@@ -43,7 +43,7 @@ def kick(model: Model, state: State, work: Work, awake: Awake, damping_stages: i
 
 def explicit_part(model: Model, work: Work) -> Model | None:
     """The model with the tets of bodies that take explicit steps alone; None where none does."""
-    return work.implicit.lumped if work.implicit else model
+    return work.implicit.explicit if work.implicit else model
 
 
 def _kick_undamped(model: Model, state: State, work: Work, awake: Awake) -> None:

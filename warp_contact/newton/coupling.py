@@ -2,13 +2,17 @@
 
 import numpy as np
 import warp as wp
-from newton import BodyFlags, StateFlags
+from newton import BodyFlags
 from newton.solvers.experimental.coupled import CouplingInterface
 
 from warp_contact import Simulation
+from warp_contact.newton.layout import Solid
 from warp_contact.newton.refusals import numbers
+from warp_contact.scene.scene import rotation_matrix
 
 FAR = 0.5  # of its size: a proxy that is put further away jumps
+STEPS = 2.0  # of ours, at least, in which a proxy goes all of the way to where it should be
+LEARNT = 0.1  # in a step, of what moves a body beside gravity and contact
 
 
 class Coupling(CouplingInterface):
@@ -17,9 +21,18 @@ class Coupling(CouplingInterface):
     A proxy moves as a rigid body of its own during a step, and the force of contact on it is what
     the other solver is told; not that of statics, driven bodies and other proxies, which the other
     solver has by itself.
+
+    The other solver steps first, with the force of the step before. A proxy that began its step
+    where the body began that one would answer contacts anew that the body has yet to be told of: a
+    feedback a step late, by which light bodies on stiff ones tumble. So it goes ahead: it begins
+    where the body has ended, by which the force is in time for the body's next step, and the two
+    move as one body would. With iterations both take the same step.
     """
 
     _restarts, _stepped = False, True
+    _begun: np.ndarray
+    _beside: np.ndarray
+    _told_qd: np.ndarray
     _kept: tuple[Simulation | None, dict, list] = (None, {}, [])
 
     def coupling_supports_full_surface_soft_contacts(self) -> bool:
@@ -57,10 +70,40 @@ class Coupling(CouplingInterface):
             values = self.simulation._values() if self.simulation else {}
             kept = {name: np.array(value) for name, value in values.items()}
             self._kept = self.simulation, kept, [a.copy() for a in self._given()]
+        if iteration_restart or self._stepped:
+            self._begun = numbers(state.body_q).copy()
         self._stepped = False
-        self._gained[:] = 0.0
-        if int(flags) & int(StateFlags.BODY_Q) and self.simulation:
-            self._let_proxies_move(state, dt)
+
+    def coupling_rewind_proxy_body(
+        self, body_local_to_proxy_global, state, coupling_forces, body_gravity_acceleration, dt
+    ) -> None:
+        """Put proxies where their step begins, with the velocity that the other solver gave them.
+
+        A lagged proxy is given the place where its body began; staggered, or with SolverXPBD, which
+        writes it into its input, the one where it ended.
+        """
+        of, gravity = body_local_to_proxy_global.numpy(), body_gravity_acceleration.numpy()
+        forces = coupling_forces.numpy()
+        q, qd, wrench = state.body_q.numpy(), state.body_qd.numpy(), state.body_f.numpy()
+        for solid in (s for s in self._layout.solid if of[s.body] >= 0 and not s.driven):
+            b = solid.body
+            told = forces[of[b]] if forces[of[b]].any() else self._gained[b] / dt
+            mass = self._mass(b, q)
+            sped_up = np.linalg.solve(mass, told)
+            sped_up[:3] += gravity[b]
+            ended = (q[b] != self._begun[b]).any()
+            if self._restarts == ended:
+                self._move_on(b, q, qd, -dt if ended else dt)
+            self._gained[b] = wrench[b] = 0.0
+            if self._restarts:
+                qd[b] -= dt * sped_up
+            else:
+                wrench[b] = mass @ self._learn(b, qd[b], sped_up, dt)
+            if self.simulation and not self._jump_body[b]:
+                self._let_move(solid, q, qd, dt, gravity[b] + wrench[b, :3] / mass[0, 0])
+        state.body_q.assign(q)
+        state.body_qd.assign(qd)
+        state.body_f.assign(wrench)
 
     def coupling_harvest_proxy_wrenches(
         self,
@@ -84,30 +127,51 @@ class Coupling(CouplingInterface):
             out[own[body]] = self._gained[body] / dt
         out_body_f.assign(out)
 
-    def _let_proxies_move(self, state, dt: float) -> None:
+    def _move_on(self, b: int, q: np.ndarray, qd: np.ndarray, dt: float) -> None:
+        """Let a pose of ``q``, shape (n, 7), be where its velocity brings it in ``dt`` [s]."""
+        centre, w = self._centre(b, q), wp.vec3(*qd[b, 3:].tolist())
+        turn = wp.quat_from_axis_angle(wp.normalize(w), dt * wp.length(w))
+        q[b, 3:] = list(turn * wp.quat(*q[b, 3:].tolist()))
+        q[b, :3] += centre + dt * qd[b, :3] - self._centre(b, q)
+
+    def _mass(self, b: int, q: np.ndarray) -> np.ndarray:
+        """Mass [kg] and inertia [kg m^2] of a body at a pose of ``q``, shape (6, 6)."""
+        turn, out = rotation_matrix(q[b, 3:].astype(np.float64)), np.zeros((6, 6))
+        out[:3, :3] = self.model.body_mass.numpy()[b] * np.eye(3)
+        out[3:, 3:] = turn @ self.model.body_inertia.numpy()[b] @ turn.T
+        return out
+
+    def _learn(self, b: int, qd: np.ndarray, sped_up: np.ndarray, dt: float) -> np.ndarray:
+        """What else moves a body [m/s^2], [rad/s^2], shape (6,): joints, motors, other contacts.
+
+        Without it a proxy that a motor presses on a body would stay behind by a step of its force.
+        Taken over at once it is a feedback a step late again.
+        """
+        now = (qd - self._told_qd[b]) / dt - sped_up
+        known = np.isfinite(now).all()
+        self._beside[b] += LEARNT * (now - self._beside[b]) if known else -self._beside[b]
+        self._told_qd[b] = qd
+        return self._beside[b]
+
+    def _let_move(
+        self, solid: Solid, q: np.ndarray, qd: np.ndarray, dt: float, gravity: np.ndarray
+    ) -> None:
         """Make the way from where a proxy is to where it should be a velocity, and no jump.
 
-        What is put elsewhere is moved apart without motion: its momentum would be lost.
+        What is put elsewhere is moved apart without motion: its momentum would be lost. Where a
+        contact stops the velocity at once, a whole way in the first of many steps swings up.
         """
-        q, qd, moved = state.body_q.numpy(), state.body_qd.numpy(), False
-        for solid in self._layout.solid:
-            b = solid.body
-            if not self._proxies[b] or self._jump_body[b] or (q[b] == self._pose[b]).all():
-                continue
-            turn = wp.quat(*q[b, 3:].tolist()) * wp.quat_inverse(
-                wp.quat(*self._pose[b, 3:].tolist())
-            )
-            axis, angle = wp.quat_to_axis_angle(turn)
-            way = self._centre(b, q) - self._centre(b, self._pose)
-            if (
-                np.linalg.norm(way)
-                < FAR * np.ptp(self.simulation.positions(solid.index), axis=0).max()
-            ):
-                qd[b] += np.concatenate([way, angle * np.array(axis)]) / dt
-                q[b], moved = self._pose[b], True
-        if moved:
-            state.body_q.assign(q)
-            state.body_qd.assign(qd)
+        b, sim = solid.body, self.simulation
+        turn = wp.quat(*q[b, 3:].tolist()) * wp.quat_inverse(wp.quat(*self._pose[b, 3:].tolist()))
+        axis, angle = wp.quat_to_axis_angle(turn)
+        way = self._centre(b, q) - self._centre(b, self._pose)
+        if np.linalg.norm(way) >= FAR * np.ptp(sim.positions(solid.index), axis=0).max():
+            return
+        step = 1.0 / (sim.fps * max(sim.substeps, 1))
+        part = min(1.0, STEPS * step / dt)
+        qd[b] += part / dt * np.concatenate([way, angle * np.array(axis)])
+        qd[b, :3] += 0.5 * step * gravity  # theirs is the velocity of the middle of a step
+        q[b] = self._pose[b]
 
     def _begin_again(self) -> None:
         sim, values, given = self._kept

@@ -117,6 +117,7 @@ class SolverContactSurface(Coupling, SolverBase):
         bodies = chosen[numbers(self.model.body_world).astype(int)]
         every = StateFlags.PARTICLE | StateFlags.BODY
         self._layout.restore(state, particles, bodies, int(every if flags is None else flags))
+        self._gained[bodies], self._told_qd[bodies] = 0.0, np.nan
         if self.simulation is None:
             return
         if mask is None:
@@ -186,11 +187,12 @@ class SolverContactSurface(Coupling, SolverBase):
         self._q, self._qd, self._pose, self._twist = (a.copy() for a in self._layout.start)
         self._jump = np.ones(self.model.particle_count, dtype=bool)
         self._jump_body = np.ones(self.model.body_count, dtype=bool)
-        self._gained = np.zeros((self.model.body_count, 6))
+        self._gained, self._beside = np.zeros((2, self.model.body_count, 6))
+        self._told_qd = np.full((self.model.body_count, 6), np.nan)
 
     def _lose(self) -> None:
         """After an error nothing is known: the next step puts everything where its state has it."""
-        for last in self._q, self._qd, self._pose, self._twist:
+        for last in self._q, self._qd, self._pose, self._twist, self._told_qd:
             last[:] = np.nan
         self._jump[:], self._jump_body[:] = True, True
 

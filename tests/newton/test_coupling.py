@@ -66,7 +66,9 @@ class Pair:
         return ball + mass[own] @ self.now.particle_qd.numpy()
 
 
-@pytest.mark.parametrize("more", [{}, {"substeps": 2}, {"substeps": 4}, {"mode": "staggered"}])
+@pytest.mark.parametrize(
+    "more", [{}, {"substeps": 2}, {"substeps": 4}, {"mode": "staggered"}, {"iterations": 2}]
+)
 def test_a_ball_of_another_solver_hits_a_block(device, more, add_block, run_of):
     def build():
         builder = newton.ModelBuilder(gravity=NONE)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warp_contact import NeoHookean, Penalty, Scene, Simulation, box
+from warp_contact import NeoHookean, Penalty, Rigid, Scene, Simulation, box
 from warp_contact.frame import between
 
 G = 9.81
@@ -134,6 +134,17 @@ def test_what_rests_does_not_move(response, tmp_path):
     other = stacked()
     other.load(tmp_path / "run.npz")
     np.testing.assert_array_equal(other.velocities(), sim.velocities())
+
+
+@pytest.mark.parametrize("material", [NeoHookean(1e5, 0.3, 1000.0, 2e-3), Rigid(1000.0)], ids=str)
+def test_what_rests_reads_no_velocity_in_steps_that_fall_less_than_its_gap(material):
+    scene = Scene()
+    scene.add_plane((0.0, 0.0, 1.0))
+    scene.add_body(box(0.1, 2), material, (0.0, 0.0, 0.05001))
+    sim = run(Simulation(scene, fps=960, integrator="implicit"), 500)
+    assert sim.substeps == 1 and 0.5 * G / sim.fps > 5e-3  # half a step of free fall
+    # Positions of 0.1 m in float32 tell no slower motion in a step than 7e-6 m/s.
+    np.testing.assert_allclose(sim.velocities(), 0.0, atol=5e-5)
 
 
 def test_reading_changes_nothing():

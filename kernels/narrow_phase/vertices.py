@@ -163,6 +163,7 @@ def find_penetrations(
     mesh: Mesh,
     pairs: PairList,  # vertices and bodies
     travelled: wp.array[float],  # (n_body + n_plane,) [m]
+    near_plane: float,  # [edge] a vertex this close above one counts too
     thickness: wp.array[float],  # (n_body,) [m]
     x0: wp.array[wp.vec3],  # (n_vert,) start of the step [m]
     x: wp.array[wp.vec3],  # (n_vert,) [m]
@@ -187,7 +188,7 @@ def find_penetrations(
         if body >= mesh.n_body:
             p = body - mesh.n_body
             clear = wp.dot(mesh.plane_n[p], x[i]) - mesh.plane_h[p]
-            inside = clear < 0.0
+            inside = clear < near_plane * mesh.body_edge[mesh.vert_body[i]]
         else:
             margin = VERTEX_MARGIN * mesh.body_edge[body]
             clear = clearance(x[i], margin, pairs.items[c], pairs.item, mesh.tets, x)

@@ -8,9 +8,12 @@ from warp_contact.data.work import Work
 from warp_contact.step import impulse, narrow_phase
 
 
-def detect(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
-    """Contacts of vertices and edges at ``x``, in a step from ``x0``, and their constants."""
-    narrow_phase.find_vertices(model, x0, x, work)
+def detect(model: Model, x0: wp.array, x: wp.array, work: Work, near_plane: float = 0.0) -> None:
+    """Contacts of vertices and edges at ``x``, in a step from ``x0``, and their constants.
+
+    ``near_plane`` as in ``find_vertices``.
+    """
+    narrow_phase.find_vertices(model, x0, x, work, near_plane)
     narrow_phase.clear_places(work)
     narrow_phase.find_edges(model, x0, x, work)
     if_any(work.narrow_phase.n_crossing, narrow_phase.append_edge_contacts, model, x0, work)

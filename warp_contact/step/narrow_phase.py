@@ -21,11 +21,16 @@ from warp_contact.step.contact_graph import count_contacts
 from warp_contact.step.depth import find_depths
 
 
-def find_vertices(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
-    """Contacts of the vertices inside other bodies at ``x``, in a step from ``x0``."""
+def find_vertices(
+    model: Model, x0: wp.array, x: wp.array, work: Work, near_plane: float = 0.0
+) -> None:
+    """Contacts of the vertices inside other bodies at ``x``, in a step from ``x0``.
+
+    A vertex above a plane by less than ``near_plane`` edges of its body has one too.
+    """
 
     def find() -> None:
-        _find_penetrations(model, x0, x, work)
+        _find_penetrations(model, x0, x, work, near_plane)
         if_any(work.contacts.n_vertex, make_contacts, otherwise=work.contacts.n.zero_)
 
     def make_contacts() -> None:
@@ -99,14 +104,17 @@ def append_edge_contacts(model: Model, x0: wp.array, work: Work) -> None:
     count_contacts(work, n.n_crossing, n.n_place)
 
 
-def _find_penetrations(model: Model, x0: wp.array, x: wp.array, work: Work) -> None:
+def _find_penetrations(
+    model: Model, x0: wp.array, x: wp.array, work: Work, near_plane: float
+) -> None:
     """Set the vertices inside other bodies at ``x``, or gone through, by vertex and body."""
     b, n = work.broad_phase, work.narrow_phase
     track(model, x, b.verts.travel, work)
     launch_over(
         vertices.find_penetrations,
         work.capacity.verts,
-        inputs=[work.mesh, b.verts.list, b.verts.travel.travelled] + [model.body_thickness, x0, x],
+        inputs=[work.mesh, b.verts.list, b.verts.travel.travelled, near_plane]
+        + [model.body_thickness, x0, x],
         outputs=[b.verts.clear_until, n.inside_at],
     )
     scan(n.inside_at, work.scan, inclusive=False)

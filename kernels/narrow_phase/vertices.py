@@ -180,7 +180,8 @@ def find_penetrations(
         i = pairs.pair[c][0]
         body = pairs.pair[c][1]
         spent = travelled[mesh.vert_body[i]] + travelled[body]
-        if spent < clear_until[c]:
+        near = near_plane * mesh.body_edge[mesh.vert_body[i]]
+        if spent + near < clear_until[c]:
             continue
         clear_until[c] = INSIDE
         clear = float(0.0)
@@ -188,7 +189,7 @@ def find_penetrations(
         if body >= mesh.n_body:
             p = body - mesh.n_body
             clear = wp.dot(mesh.plane_n[p], x[i]) - mesh.plane_h[p]
-            inside = clear < near_plane * mesh.body_edge[mesh.vert_body[i]]
+            inside = clear < near
         else:
             margin = VERTEX_MARGIN * mesh.body_edge[body]
             clear = clearance(x[i], margin, pairs.items[c], pairs.item, mesh.tets, x)

@@ -129,6 +129,11 @@ def test_a_world_moves_as_if_it_were_alone(observed, neighbour):
     same_bits(observed, motion(observed, [neighbour]))
 
 
+def test_nor_does_a_neighbour_move_it_in_implicit_steps():
+    """The contacts of both are listed anew where one of them finds new ones."""
+    same_bits("edges", motion("edges", [pile], integrator="implicit"), integrator="implicit")
+
+
 @pytest.mark.parametrize("place", ["last", "between"])
 @pytest.mark.parametrize("observed", OBSERVED)
 def test_it_may_stand_anywhere_in_the_scene(observed, place):

@@ -5,7 +5,8 @@ contact, with the body that it touches. An edge keeps all its contacts with thei
 (persistent.py). Where the normal has turned, the tangential impulse turns too.
 
 Implicit steps may change their length by half from frame to frame. They keep the impulses over it,
-as forces: those of a body at rest are then right for any step.
+as forces: those of a body at rest are then right for any step. Within a step impulses stay as they
+are, as a world that has no new contacts must go on with the same bits.
 """
 
 import warp as wp
@@ -110,7 +111,9 @@ def recall_edges(
     for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
         if constraint[c].inv_mass > 0.0:
             level = wp.vec3(0.0, 0.0, 0.0)
-            kept = share * unit_of(contact[c].vert[0], dt) * found[source[c]].kept
+            kept = found[source[c]].kept
+            if not again:
+                kept = share * unit_of(contact[c].vert[0], dt) * kept
             if not again or worlds.has_new[worlds.of_vert[contact[c].vert[0]]] > 0:
                 kept = turned(kept, contact[c].normal, constraint[c].friction, level)
             impulse[c] = started(kept)
@@ -161,6 +164,7 @@ def keep_edges(
     for c in range(n_vertex[0] + wp.tid(), n_contact[0], threads):
         now = found[source[c]]
         if worlds.open[worlds.of_vert[contact[c].vert[0]]] >= look:
-            now.kept = kept_of(impulse[c]) / unit_of(contact[c].vert[0], dt)
+            now.kept = kept_of(impulse[c])
             found[source[c]] = now
+        now.kept = now.kept / unit_of(contact[c].vert[0], dt)
         edges[c - n_vertex[0]] = now

@@ -30,6 +30,7 @@ from warp_contact.kernels.narrow_phase import (
 from warp_contact.kernels.narrow_phase import edges as crossing
 from warp_contact.kernels.surface import closure, coupled_closure, coupled_spin, residual
 from warp_contact.kernels.ties import attachment, drive, lacking, matrix, motor, solve
+from warp_contact.kernels.ties import closure as tied_closure
 from warp_contact.kernels.ties import rows as tied_rows
 
 # What a frame of any scene uses. The search for overlaps at the start, other responses, sleeping
@@ -37,7 +38,7 @@ from warp_contact.kernels.ties import rows as tied_rows
 ALWAYS = [scan, worlds, bounds, edges, hashing, skins, near, pairs, shape, lanczos, motion, closure]
 ALWAYS += [constraint, impulse, pair_impulses, warm_start, residual]
 ALWAYS += [contact_graph, crossing, depth, persistent, vertex_contact, vertices]
-TIES = attachment, drive, lacking, matrix, motor, solve, tied_rows
+TIES = attachment, tied_closure, drive, lacking, matrix, motor, solve, tied_rows
 IMPLICIT = [advance, bodies, masses, mobility, predict, settle, iterations]
 IMPLICIT += [coupled, coupled_closure, coupled_spin, rows, touched]
 

@@ -79,13 +79,15 @@ def close(model: Model, state: State, work: Work, look: int) -> None:
     place(model, x, work.implicit)  # bodies turn about where they are now
     if on("closure torque"):
         _find_spin(model, state, work)
+    if work.ties:
+        ties.begin_closure(x, work)
     w, c = work.implicit, work.contacts
     inputs = [c.n, c.record, work.surface.slack, x]
     outputs = [w.ahead, w.counted]
     launch_over(closure.begin_pushes, work.capacity.contacts, inputs=inputs, outputs=outputs)
     _repeat(model, x, work, look, _solve_gaps)
     if work.ties:
-        ties.settle(model, x, work, keeps=False)
+        ties.close(model, x, work)
     if on("closure torque"):
         _keep_spin(model, state, work)
 
@@ -103,6 +105,8 @@ def _keep_spin(model: Model, state: State, work: Work) -> None:
     inputs = [c.n, c.record, state.v, w.bodies, w.kept]
     outputs = [work.surface.push, c.part]
     launch_over(spin.lost_spin, work.capacity.contacts, inputs=inputs, outputs=outputs)
+    if work.ties:
+        ties.give_back(model, work)
     inputs = [c.graph, c.part, w.touched, w.busy, state.x, state.v, w.bodies, w.spin]
     wp.launch(spin.find_rotation, model.n_body, inputs=inputs, outputs=[w.kept])
     inputs = [w.busy, w.bodies, w.kept]

@@ -7,7 +7,7 @@ from warp_contact.data.model import Model
 from warp_contact.data.state import State
 from warp_contact.data.work import Work
 from warp_contact.kernels.impulse import coupled
-from warp_contact.kernels.ties import attachment, lacking, matrix, motor, rows, solve
+from warp_contact.kernels.ties import attachment, closure, lacking, matrix, motor, rows, solve
 from warp_contact.step import implicit
 
 ROUNDS = 2  # of the ties in a step, as many after the contacts
@@ -28,6 +28,15 @@ def begin(x: wp.array, work: Work) -> None:
     t, d = work.ties, work.implicit.bodies
     wp.launch(matrix.begin_ties, t.n, inputs=[work.dt, x, d], outputs=[t.ties])
     find_matrix(x, work)
+
+
+def begin_closure(x: wp.array, work: Work) -> None:
+    """Let matrix and row sums be those at ``x``, where the mobilities are now.
+
+    With those of another place sweeps over bodies that turned far do not end.
+    """
+    find_matrix(x, work)
+    find_rows(work)
 
 
 def hold(model: Model, state: State, work: Work) -> None:
@@ -102,6 +111,32 @@ def settle(model: Model, y: wp.array, work: Work, keeps: bool) -> None:
         inputs = [False, work.worlds, w.before, y]
         wp.launch(solve.find_changes, t.n, inputs=inputs, outputs=[t.ties])
         _pull(model, y, work, keeps)
+
+
+def close(model: Model, x: wp.array, work: Work) -> None:
+    """Close at ``x`` what the closure of contacts opened; set ``busy`` where both moved a body."""
+    t, w = work.ties, work.implicit
+    settle(model, x, work, keeps=False)
+    for _ in range(ROUNDS):
+        _find_moved(model, work)
+        implicit.place(model, x, w)
+        wp.launch(closure.restore, model.n_vert, inputs=[w.busy, t.tied, w.bodies], outputs=[x])
+        wp.launch(closure.find_left, t.n, inputs=[x], outputs=[t.ties])
+        _pull(model, x, work, keeps=False)
+    _find_moved(model, work)
+
+
+def give_back(model: Model, work: Work) -> None:
+    """Add to the angular momenta ``spin`` what ties took of them in the closure."""
+    t, w = work.ties, work.implicit
+    inputs = [t.ties, t.tied, w.bodies, w.kept]
+    wp.launch(closure.give_back, model.n_body, inputs=inputs, outputs=[w.spin])
+
+
+def _find_moved(model: Model, work: Work) -> None:
+    t, w = work.ties, work.implicit
+    inputs = [w.impulse, w.touched, t.ties, t.tied, w.bodies]
+    wp.launch(closure.find_moved, model.n_body, inputs=inputs, outputs=[w.busy])
 
 
 def record(model: Model, x: wp.array, work: Work) -> None:

@@ -72,3 +72,13 @@ def test_rigid_bodies_are_closed_as_if_nothing_were_attached_in_other_worlds():
         return [np.concatenate([sim.positions("0"), sim.positions("1")]) for _ in sim.frames(20)]
 
     np.testing.assert_array_equal(positions(ties=True), positions(ties=False))
+
+
+def test_ties_that_were_closed_are_left_alone_when_other_worlds_are_closed_again():
+    scene = wc.Scene(gravity=(0.0, 0.0, 0.0))
+    add_pair(scene, 0.0)
+    sim = wc.Simulation(scene, fps=3840, substeps=1)
+    start = sim.positions()
+    sim.step_frame()
+    assert np.abs(sim.positions() - start).max() > 1e-4  # it was closed
+    assert not sim._stepper.work.ties.ties.moved.numpy().any()

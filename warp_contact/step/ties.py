@@ -124,6 +124,7 @@ def close(model: Model, x: wp.array, work: Work) -> None:
         wp.launch(closure.find_left, t.n, inputs=[x], outputs=[t.ties])
         _pull(model, x, work, keeps=False)
     _find_moved(model, work)
+    wp.launch(solve.settled, t.n_cluster, inputs=[], outputs=[t.ties])
 
 
 def give_back(model: Model, work: Work) -> None:

@@ -221,7 +221,7 @@ def _points(a: Body, b: Body | None, kind: str, at, vertices, line):
     at = checks.numbers(at, (3,), "at", HUGE)
     if kind == "ball":
         return at[None], None
-    size = 0.5 * np.ptp(a.x, axis=0).max()
+    size = 0.5 * np.ptp(a.mesh.vertices, axis=0).max()  # however it is turned
     if kind == "hinge":
         return at + size * np.outer([-1.0, 1.0], line), None
     if kind == "weld":  # corners of a tetrahedron: springs there have no torque

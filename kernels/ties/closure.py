@@ -28,6 +28,7 @@ from warp_contact.kernels.impulse.rows import Touched
 from warp_contact.kernels.options import OPTIONS
 from warp_contact.kernels.ties import tie
 from warp_contact.kernels.ties.tie import Tied, Ties, across, gap
+from warp_contact.kernels.worlds import FIRST_LOOK, Worlds
 
 wp.set_module_options(OPTIONS)
 
@@ -119,3 +120,14 @@ def give_back(
                     part = -part  # its weights have the sum -1
                 u = as_vec3d(motion.v[one] - motion.v[other])
                 spin[b] = spin[b] - part * wp.cross(ties.since[t], u)
+
+
+@wp.kernel
+def look_again(
+    # in
+    ties: Ties,
+    # in, out
+    worlds: Worlds,
+):
+    """One thread per tie: its world looks for overlaps a second time."""
+    worlds.open[worlds.of_vert[ties.vert[wp.tid()][0]]] = FIRST_LOOK

@@ -48,12 +48,3 @@ def add_strays(model: Model, x: wp.array, v: wp.array, work: Work) -> None:
         inputs=[c.n, c.record, work.dt, x, v],
         outputs=[work.worlds, work.surface.found],
     )
-
-
-def look_again(work: Work) -> None:
-    """Let the closure and its second look run in all worlds.
-
-    Attachments pass impulses on, and so lead corners in that had no contact.
-    """
-    work.worlds.open.fill_(FIRST_LOOK)
-    work.surface.any_open.fill_(1)

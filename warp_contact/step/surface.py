@@ -16,7 +16,7 @@ from warp_contact.kernels.lengths import OLD_OVERLAP
 from warp_contact.kernels.surface import closure
 from warp_contact.kernels.surface.residual import keep_contacts
 from warp_contact.kernels.worlds import FIRST_LOOK, SECOND_LOOK
-from warp_contact.step import coupled, residual, search, sweeps
+from warp_contact.step import coupled, residual, search, sweeps, ties
 from warp_contact.step.contact_graph import add_parts
 from warp_contact.step.detection import detect
 from warp_contact.step.motion import explicit_part
@@ -30,26 +30,40 @@ def close_gaps(model: Model, state: State, work: Work, iterations: int) -> None:
     residual.add_gaps(model, state.x, work)
     if on("strays"):
         residual.add_strays(model, state.x, state.v, work)
-        if work.ties:
-            residual.look_again(work)
-    if_any(work.surface.any_open, _close_gaps, model, state, work, iterations)
+    if not work.ties:
+        return if_any(work.surface.any_open, _close_twice, model, state, work, iterations)
+    if_any(work.surface.any_open, _close, model, state, work, iterations)
+    ties.look_again(work)
+    _close_again(model, state, work)
 
 
-def _close_gaps(model: Model, state: State, work: Work, iterations: int) -> None:
-    searched = OLD_OVERLAP if on("search") else math.inf
+def _close_twice(model: Model, state: State, work: Work, iterations: int) -> None:
+    _close(model, state, work, iterations)
+    _close_again(model, state, work)
+
+
+def _close(model: Model, state: State, work: Work, iterations: int) -> None:
     if iterations and on("search"):
         if_any(work.surface.any_old, _search, model, state, work, iterations)
     # Where bodies were apart, no overlap is older than the step: one that seems so has a wrong
     # plane, and the second look may find a better one.
     first = OLD_OVERLAP if on("old planes") else math.inf
-    close(model, state, work, FIRST_LOOK, searched, first)
+    close(model, state, work, FIRST_LOOK, _searched(), first)
+
+
+def _close_again(model: Model, state: State, work: Work) -> None:
     # Vertices may now be at other triangles than before, and edges may cross that the narrow phase
     # could not see.
     if on("second look"):
         _keep_contacts(work)
         detect(model, state.x, state.x, work)
     residual.find_gaps_left(model, state.x, work)
-    if_any(work.surface.any_open, close, model, state, work, SECOND_LOOK, searched)
+    if_any(work.surface.any_open, close, model, state, work, SECOND_LOOK, _searched())
+
+
+def _searched() -> float:
+    """How old an overlap is for the search, in edges."""
+    return OLD_OVERLAP if on("search") else math.inf
 
 
 def _keep_contacts(work: Work) -> None:

@@ -127,6 +127,15 @@ def close(model: Model, x: wp.array, work: Work) -> None:
     wp.launch(solve.settled, t.n_cluster, inputs=[], outputs=[t.ties])
 
 
+def look_again(work: Work) -> None:
+    """Let the second look of the closure run in all worlds with attachments.
+
+    These pass impulses on, and so lead corners in that had no contact.
+    """
+    inputs, outputs = [work.ties.ties], [work.worlds]
+    wp.launch(closure.look_again, work.ties.n, inputs=inputs, outputs=outputs)
+
+
 def give_back(model: Model, work: Work) -> None:
     """Add to the angular momenta ``spin`` what ties took of them in the closure."""
     t, w = work.ties, work.implicit

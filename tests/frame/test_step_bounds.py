@@ -8,6 +8,7 @@ import pytest
 from warp_contact import (
     NeoHookean,
     Penalty,
+    Rigid,
     Scene,
     Simulation,
     SimulationError,
@@ -16,6 +17,7 @@ from warp_contact import (
 )
 from warp_contact.frame import step_bounds
 from warp_contact.frame.damping import RATE_MARGIN
+from warp_contact.frame.diagnosis import flattest_tet
 
 OMEGA = 1000.0  # [1/s]
 # As promised in warp_contact/README.md: 0.6 of the stable step, a quarter of the thinnest body, a
@@ -171,3 +173,17 @@ def test_a_frame_that_would_take_for_ever_ends_the_run_with_its_reason(density, 
     assert sim.frame == 0
     with pytest.raises(ValueError, match="max_substeps 0: give a whole number"):
         Simulation(scene, max_substeps=0)
+
+
+def test_flat_tets_of_what_does_not_deform_are_no_reason_of_an_end():
+    def flattest(*others) -> str:
+        scene, sheet = Scene(), box((0.1, 0.1, 1e-4), 1)
+        scene.add_body(sheet, Rigid(1000.0), (0.0, 0.0, 0.3), label="sheet")
+        for k, fixed in enumerate(others):
+            mesh = sheet if fixed else box(0.1, 1)
+            scene.add_body(mesh, NeoHookean(1e5, 0.3, 1000.0), (k, 0, 0), fixed=fixed, label=str(k))
+        sim = Simulation(scene)
+        return flattest_tet(sim.model, sim.state.x)
+
+    assert flattest().startswith("body 'sheet', tet ")
+    assert flattest(True, False).startswith("body '1', tet ")

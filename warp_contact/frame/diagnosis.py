@@ -5,6 +5,7 @@ import warp as wp
 
 from warp_contact.data.model import Model
 from warp_contact.data.state import State
+from warp_contact.frame.implicit_shapes import mobile
 
 
 def finite_vertices(state: State) -> np.ndarray:
@@ -19,14 +20,21 @@ def vertex_name(model: Model, vertex: int) -> str:
 
 
 def flattest_tet(model: Model, x: wp.array) -> str:
-    """Body of the tet with the least height, volume over largest face, and its number there."""
+    """Body of the tet with the least height, volume over largest face, and its number there.
+
+    Of bodies that deform; of rigid ones, or those held as a whole, where there are no others.
+    """
     at = x.numpy().astype(np.float64)
     a, b, c, d = np.moveaxis(at[model.tets.numpy()], 1, 0)
     faces = ((b, c, d), (a, c, d), (a, b, d), (a, b, c))
     area = [np.linalg.norm(np.cross(q - p, r - p), axis=1) for p, q, r in faces]
     volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a))
-    k = int((volume / np.maximum(np.max(area, axis=0), 1e-30)).argmin())
-    body = int(model.vert_body.numpy()[model.tets.numpy()[k, 0]])
+    height = volume / np.maximum(np.max(area, axis=0), 1e-30)
+    own = model.vert_body.numpy()[model.tets.numpy()[:, 0]]
+    soft = np.array([material.kernels is not None for material in model.materials])
+    deforms = (soft & mobile(model))[own]
+    k = int(np.where(deforms | ~deforms.any(), height, np.inf).argmin())
+    body = int(own[k])
     return f"body '{model.labels[body]}', tet {k - int(model.body_tet.numpy()[body])}"
 
 

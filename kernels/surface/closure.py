@@ -14,9 +14,8 @@ A move p n of a contact that slides by u_t changes the angular momentum by p n x
 get it back as the torque of tangent.py, dv_k = (b_k . p u_t) n / m_k.
 
 slack is the overlap beyond the largest move of a step, less the resting gap of the impulses: a full
-correction would invert a body that starts deep inside another. In implicit steps an overlap that
-came about in the step is closed at once: bodies are moved there, not strained. Contacts without an
-overlap are only kept from getting one.
+correction would invert a body that starts deep inside another. Contacts without an overlap are only
+kept from getting one.
 """
 
 import warp as wp
@@ -38,7 +37,7 @@ PASSES = wp.constant(128)  # at most; corners that meet need more than 32
 def begin_closure(
     # in
     threads: int,
-    limits: wp.vec4,  # see below, in edges
+    limits: wp.vec3,  # see below, in edges
     n_contact: wp.array[int],  # (1,)
     contact: wp.array[Contact],  # (capacity,)
     constraint: wp.array[Constraint],  # (capacity,)
@@ -52,17 +51,17 @@ def begin_closure(
 ):
     """For each contact: the overlap that is left to later steps.
 
-    The limits are the overlap at the start of the step beyond which a contact is left out, and the
-    largest move in a step: each in worlds where bodies may have overlapped before, and in others.
+    The limits are the overlap at the start of the step beyond which a contact is left out, in
+    worlds where bodies may have overlapped before and in those where they were apart, and the
+    largest move in a step.
     """
     for c in range(wp.tid(), n_contact[0], threads):
         edge = contact[c].edge_length
-        i = contact[c].vert[0]
-        apart = worlds.apart[worlds.of_vert[i]]
         slack[c] = 0.0
         if residual[c] > 0.0:
-            slack[c] = wp.max(residual[c] - limits[2 + apart] * edge, 0.0) - REST_GAP * edge
-        if -constraint[c].gap_bound * dt[i] > limits[apart] * edge:
+            slack[c] = wp.max(residual[c] - limits[2] * edge, 0.0) - REST_GAP * edge
+        i = contact[c].vert[0]
+        if -constraint[c].gap_bound * dt[i] > limits[worlds.apart[worlds.of_vert[i]]] * edge:
             for k in range(5):
                 if mobility_of(contact[c].vert[k], soft) > 0.0:
                     slack[c] = NONE

@@ -16,7 +16,7 @@ DROWNED = 1.5
 STRAINED = 0.02  # strain that rounding of the positions may put on a tet
 POSSIBLE = 1e-8, 1e9  # size of a body [m] whose masses and volumes fit float32
 PLAUSIBLE = 0.9e-6, 1.1e3  # size of a body [m]; others run too
-CRUSHED = 3.0  # pressure of its own weight, in Young's moduli, under which nothing keeps a shape
+CRUSHED = 100.0  # pressure of its own weight, in Young's moduli, under which nothing keeps a shape
 
 
 def check_given(mesh, material, label: str, render) -> None:

@@ -97,11 +97,10 @@ def close(
     if not on("closure"):
         return
     c, s = work.contacts, work.surface
-    moves = search.SEARCH_BOUND, math.inf if work.implicit else search.SEARCH_BOUND
     launch_over(
         closure.begin_closure,
         work.capacity.contacts,
-        inputs=[wp.vec4(before, apart, *moves), c.n, c.record, c.constraint]
+        inputs=[wp.vec3(before, apart, search.SEARCH_BOUND), c.n, c.record, c.constraint]
         + [work.dt, s.residual, work.worlds, search.soft(work)],
         outputs=[s.slack, s.push],
     )

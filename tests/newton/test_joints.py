@@ -98,7 +98,7 @@ def test_a_joint_holds_what_it_should_and_nothing_else(device, kind, rng, add_bl
     (a, turn), (b, other) = frames_of(run)
     moved, turned = turn.T @ (b - a), turn.T @ other
     if kind == "prismatic":
-        assert abs(moved @ axis) > 1e-3
+        assert abs(moved @ axis) > 5e-5  # some draws slide that slowly; across it is 2e-5 at most
         moved = moved - axis * (axis @ moved)
     np.testing.assert_allclose(moved, 0.0, atol=2e-5)
     if kind in ("fixed", "prismatic"):

@@ -1,4 +1,4 @@
-"""How a vertex answers an impulse: the only place where the contact solver looks this up.
+"""How a vertex with a lumped mass answers an impulse; where row sums of other bodies lie.
 
     dv_i = G_i p,   G_i = 1 / m_i, 0 for a fixed vertex               mobility   [1/kg]
 
